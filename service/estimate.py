@@ -1,0 +1,251 @@
+"""The values on the wire: what the daemon says about its belief, its budget, its sensors and its health.
+
+One set of typed structs serves every consumer: JSON on Zenoh, JSON Schema on request (``@rpc/schema``), rows of a
+replay. SI units, radians, north-east-down. A figure that is not known is ``null``, never a zero or a NaN.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+Metres = Annotated[float, Meta(description="m")]
+Triple = tuple[float | None, float | None, float | None]
+Triangle = tuple[float | None, float | None, float | None, float | None, float | None, float | None]
+
+
+class HealthState(StrEnum):
+    """What the belief is worth; each state is defined in docs/operating.md."""
+
+    WAITING = "waiting"
+    CONVERGING = "converging"
+    TRACKING = "tracking"
+    AMBIGUOUS = "ambiguous"
+    DEAD_RECKONING = "dead_reckoning"
+    LOST = "lost"
+    STARVED = "starved"
+
+
+class Estimate(msgspec.Struct, frozen=True, gc=False):
+    """The belief at one tick, predicted to the tick's own time.
+
+    Attributes
+    ----------
+    sequence : int
+        Counts ticks from the start of the loop; a gap means that values were dropped on the way, never reordered.
+    time : float
+        Unix time of validity, seconds.
+    monotonic_ns : int
+        The same on the host's monotonic clock, nanoseconds.
+    health, reason : HealthState, str
+        What the belief is worth, and why.
+    level : int
+        Degradation of this tick: 0 full, 1 fewer particles than demanded, 2 measurements thinned, 3 extraction beyond
+        the Gaussian skipped, 4 the shadow Kalman filter speaks, 5 prediction only.
+    position, velocity : Triple
+        North, east, down; m and m/s. ``null`` where unknown (all of it while ``waiting``).
+    heading : float or None
+        Radians clockwise from true north, in (-pi, pi].
+    position_covariance, velocity_covariance : Triangle
+        Upper triangle nn, ne, nd, ee, ed, dd; m² and (m/s)². Honest for the whole belief.
+    heading_variance : float or None
+        rad²; circular, so at most (pi²)/3 for a heading that could be any.
+    latitude, longitude, altitude : float or None
+        WGS 84 degrees and metres above mean sea level; ``null`` without an origin.
+    radius95 : float or None
+        Radius of the circle about ``position`` that holds the truth with 95 %, metres, horizontal.
+    hypotheses : int
+        How many distinct places the belief holds; 0 while ``waiting``.
+    particles, demanded, afforded : int
+        In use; needed by the belief's spread (KLD bound); affordable inside the budget.
+    effective_sample_size : float or None
+        Equation 4.36's inverse: 1 / sum of squared weights.
+    reset_counter : int
+        Steps once when the position jumps for another reason than motion.
+    biases : dict[str, tuple[float, float]]
+        Slow states: name to value and sigma.
+    """
+
+    sequence: int
+    time: float
+    monotonic_ns: int
+    health: HealthState
+    reason: str
+    level: int
+    position: Triple
+    velocity: Triple
+    heading: float | None
+    position_covariance: Triangle
+    velocity_covariance: Triangle
+    heading_variance: float | None
+    latitude: float | None
+    longitude: float | None
+    altitude: float | None
+    radius95: float | None
+    hypotheses: int
+    particles: int
+    demanded: int
+    afforded: int
+    effective_sample_size: float | None
+    reset_counter: int
+    biases: dict[str, tuple[float, float]]
+
+
+class Health(msgspec.Struct, frozen=True, gc=False):
+    """Published when it changes: the state, the reason, since when (Unix seconds), how many jumps so far."""
+
+    time: float
+    state: HealthState
+    reason: str
+    since: float
+    reset_counter: int
+
+
+class StageCost(msgspec.Struct, frozen=True, gc=False):
+    """Milliseconds that one stage took per tick since the last value: median, 99th percentile, worst."""
+
+    median: float
+    p99: float
+    worst: float
+
+
+class Budget(msgspec.Struct, frozen=True, gc=False):
+    """Once a second: what the loop spent and what it gave up.
+
+    Attributes
+    ----------
+    time : float
+        Unix seconds.
+    budget_ms, rate : float
+        What the configuration grants per tick, and ticks per second.
+    stages : dict[str, StageCost]
+        ``ingest``, ``motion``, ``sensing``, ``resampling``, ``extraction``, ``publishing`` and ``tick`` (all of it).
+    use : float
+        Share of the budget used, median over the ticks.
+    demanded, afforded, particles, level : int
+        As in :class:`Estimate`, of the last tick.
+    ticks, missed_ticks, overruns : int
+        Since the start: ticks done, ticks that never ran because an earlier one was late, ticks over the budget.
+    lateness : StageCost
+        Milliseconds from the deadline of a tick to its start.
+    queues : dict[str, int]
+        Datagrams waiting on each link's queue at the last tick.
+    drops : dict[str, int]
+        Since the start: what was dropped, by what (``link autopilot``, ``publisher``, ``late``, ``future`` …).
+    """
+
+    time: float
+    budget_ms: float
+    rate: float
+    stages: dict[str, StageCost]
+    use: float
+    demanded: int
+    afforded: int
+    particles: int
+    level: int
+    ticks: int
+    missed_ticks: int
+    overruns: int
+    lateness: StageCost
+    queues: dict[str, int]
+    drops: dict[str, int]
+
+
+class SensorStatus(msgspec.Struct, frozen=True, gc=False):
+    """One sensor as the estimator sees it.
+
+    Attributes
+    ----------
+    name : str
+        Kind and link as configured, and the beacon where there is one: ``range/autopilot/5``.
+    rate : float
+        Readings per second over the last second.
+    trust : float or None
+        Log odds that the sensor tells the truth; ``null`` while not estimated.
+    accepted : int
+        Readings used so far.
+    refused : dict[str, int]
+        Readings not used, by reason: ``late``, ``future``, ``invalid``, ``no_beacon``, ``outlier`` …
+    innovation : float or None
+        The last one, measured minus expected, in the sensor's own unit (m, m/s, rad).
+    age : float or None
+        Seconds since the last reading used; ``null`` when there was none.
+    """
+
+    name: str
+    rate: float
+    trust: float | None
+    accepted: int
+    refused: dict[str, int]
+    innovation: float | None
+    age: float | None
+
+
+class LinkStatus(msgspec.Struct, frozen=True, gc=False):
+    """One link as its process reports it; the counts are totals since that process started."""
+
+    name: str
+    state: str
+    reason: str
+    messages: int
+    samples: int
+    malformed: dict[str, int]
+    ignored: int
+    dropped: int
+    clock: str
+    offset: float | None
+    jitter: float | None
+    age: float | None
+
+
+class Sensors(msgspec.Struct, frozen=True, gc=False):
+    """Once a second: every sensor and every link."""
+
+    time: float
+    sensors: list[SensorStatus]
+    links: list[LinkStatus]
+
+
+class ProcessStatus(msgspec.Struct, frozen=True, gc=False):
+    """One process of the service: what it is, whether it runs, how often it was restarted, what it holds."""
+
+    name: str
+    pid: int | None
+    state: str
+    restarts: int
+    reason: str
+    resident_bytes: int | None
+
+
+class Status(msgspec.Struct, frozen=True, gc=False):
+    """The answer to ``@rpc/status``: the last of everything, and the processes."""
+
+    vehicle: str
+    version: str
+    started: float
+    health: Health | None
+    budget: Budget | None
+    sensors: Sensors | None
+    processes: list[ProcessStatus]
+
+
+class Cloud(msgspec.Struct, frozen=True, gc=False):
+    """The attachment of ``particles``: how many rows, at which Unix time, of which columns."""
+
+    count: int
+    time: float
+    columns: tuple[str, str, str, str] = ("north", "east", "heading", "weight")
+
+
+def schema() -> dict[str, object]:
+    """Return the JSON Schema of every value on the wire, by name (what ``@rpc/schema`` answers)."""
+    values = (Estimate, Budget, Sensors, Health, Status, Cloud)
+    schemas, components = msgspec.json.schema_components(values, ref_template="#/$defs/{name}")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$defs": components,
+        "values": {value.__name__: schema for value, schema in zip(values, schemas, strict=True)},
+    }
