@@ -1,7 +1,7 @@
 """The values on the wire: what the daemon says about its belief, its budget, its sensors and its health.
 
-One set of typed structs serves every consumer: JSON on Zenoh, JSON Schema on request (``@rpc/schema``), rows of a
-replay. SI units, radians, north-east-down. A figure that is not known is ``null``, never a zero or a NaN.
+One set of typed structs serves every consumer: JSON on Zenoh, JSON Schema on request (``@rpc/schema``), rows of
+a replay. SI units, radians, north-east-down. A figure that is not known is ``null``, never a zero or a NaN.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
     Attributes
     ----------
     sequence : int
-        Counts ticks from the start of the loop; a gap means that values were dropped on the way, never reordered.
+        Counts ticks from the start of the loop; a gap means that values were dropped on the way, never
+        reordered.
     time : float
         Unix time of validity, seconds.
     monotonic_ns : int
@@ -43,8 +44,8 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
     health, reason : HealthState, str
         What the belief is worth, and why.
     level : int
-        Degradation of this tick: 0 full, 1 fewer particles than demanded, 2 measurements thinned, 3 extraction beyond
-        the Gaussian skipped, 4 the shadow Kalman filter speaks, 5 prediction only.
+        Degradation of this tick: 0 full, 1 fewer particles than demanded, 2 measurements thinned, 3 extraction
+        beyond the Gaussian skipped, 4 the shadow Kalman filter speaks, 5 prediction only.
     position, velocity : Triple
         North, east, down; m and m/s. ``null`` where unknown (all of it while ``waiting``).
     heading : float or None
@@ -122,19 +123,22 @@ class Budget(msgspec.Struct, frozen=True, gc=False):
     budget_ms, rate : float
         What the configuration grants per tick, and ticks per second.
     stages : dict[str, StageCost]
-        ``ingest``, ``motion``, ``sensing``, ``resampling``, ``extraction``, ``publishing`` and ``tick`` (all of it).
+        ``ingest``, ``motion``, ``sensing``, ``resampling``, ``extraction``, ``publishing`` and ``tick``
+        (all of it).
     use : float
         Share of the budget used, median over the ticks.
     demanded, afforded, particles, level : int
         As in :class:`Estimate`, of the last tick.
     ticks, missed_ticks, overruns : int
-        Since the start: ticks done, ticks that never ran because an earlier one was late, ticks over the budget.
+        Since the start: ticks done, ticks that never ran because an earlier one was late, ticks over the
+        budget.
     lateness : StageCost
         Milliseconds from the deadline of a tick to its start.
     queues : dict[str, int]
         Datagrams waiting on each link's queue at the last tick.
     drops : dict[str, int]
-        Since the start: what was dropped, by what (``link autopilot``, ``publisher``, ``late``, ``future`` …).
+        Since the start: what was dropped, by what (``link autopilot``, ``publisher``, ``late``, ``future``
+        …).
     """
 
     time: float
@@ -220,6 +224,36 @@ class ProcessStatus(msgspec.Struct, frozen=True, gc=False):
     resident_bytes: int | None
 
 
+class Publishing(msgspec.Struct, frozen=True, gc=False):
+    """What the publishing process did with what the loop gave it; counts since that process started.
+
+    Attributes
+    ----------
+    session : str
+        How the Zenoh session stands: ``listening on tcp/127.0.0.1:7447``, ``connected to …``.
+    opened : int
+        How often a session was opened.
+    published : dict[str, int]
+        Values put, by topic.
+    superseded : dict[str, int]
+        Values never put because a newer one of the topic was there already: the process was behind.
+    unsent : dict[str, int]
+        Values that had no session to go to, or whose put failed.
+    malformed : int
+        Datagrams that were none.
+    put_ms : StageCost or None
+        Milliseconds that one put took, over the last thousand.
+    """
+
+    session: str
+    opened: int
+    published: dict[str, int]
+    superseded: dict[str, int]
+    unsent: dict[str, int]
+    malformed: int
+    put_ms: StageCost | None
+
+
 class Status(msgspec.Struct, frozen=True, gc=False):
     """The answer to ``@rpc/status``: the last of everything, and the processes."""
 
@@ -230,6 +264,7 @@ class Status(msgspec.Struct, frozen=True, gc=False):
     budget: Budget | None
     sensors: Sensors | None
     processes: list[ProcessStatus]
+    publishing: Publishing | None = None
 
 
 class Cloud(msgspec.Struct, frozen=True, gc=False):
