@@ -1,7 +1,7 @@
 """The values on the wire: what the daemon says about its belief, its budget, its sensors and its health.
 
-One set of typed structs serves every consumer: JSON on Zenoh, JSON Schema on request (``@rpc/schema``), rows of
-a replay. SI units, radians, north-east-down. A figure that is not known is ``null``, never a zero or a NaN.
+One set of typed structs serves every consumer: JSON on Zenoh, JSON Schema on request (``@rpc/schema``), rows
+of a replay. SI units, radians, north-east-down. A figure that is not known is ``null``, never a zero or NaN.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
     health, reason : HealthState, str
         What the belief is worth, and why.
     level : int
-        Degradation of this tick: 0 full, 1 fewer particles than demanded, 2 measurements thinned, 3 extraction
-        beyond the Gaussian skipped, 4 the shadow Kalman filter speaks, 5 prediction only.
+        Degradation of this tick: 0 full, 1 fewer particles than demanded, 2 measurements thinned, 3
+        extraction beyond the Gaussian skipped, 4 the shadow Kalman filter speaks, 5 prediction only.
     position, velocity : Triple
         North, east, down; m and m/s. ``null`` where unknown (all of it while ``waiting``).
     heading : float or None
@@ -239,8 +239,8 @@ class Publishing(msgspec.Struct, frozen=True, gc=False):
         Values never put because a newer one of the topic was there already: the process was behind.
     unsent : dict[str, int]
         Values that had no session to go to, or whose put failed.
-    malformed : int
-        Datagrams that were none.
+    malformed : dict[str, int]
+        Datagrams that were none, by kind: ``unknown_tag``, ``broken_cloud``, ``large_cloud`` …
     put_ms : StageCost or None
         Milliseconds that one put took, over the last thousand.
     """
@@ -250,7 +250,7 @@ class Publishing(msgspec.Struct, frozen=True, gc=False):
     published: dict[str, int]
     superseded: dict[str, int]
     unsent: dict[str, int]
-    malformed: int
+    malformed: dict[str, int]
     put_ms: StageCost | None
 
 
