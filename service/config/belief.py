@@ -1,0 +1,200 @@
+"""The sections about the belief itself: vehicle, origin, start, area, motion, sensors, beacons, map."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from service.config.section import (
+    Interval,
+    Latitude,
+    Longitude,
+    Name,
+    NorthEastDown,
+    NotNegative,
+    Number,
+    Positive,
+    Section,
+    SigmaNorthEastDown,
+    Whole,
+)
+
+MotionModel = Literal["constant_velocity", "unicycle", "drift", "inertial"]
+SensorKind = Literal[
+    "position",
+    "velocity",
+    "range",
+    "bearing",
+    "range_bearing",
+    "heading",
+    "altitude",
+    "terrain",
+    "scan",
+    "speed",
+]
+SlowState = Literal["scale", "bias", "delay"]
+
+
+class Vehicle(Section):
+    """Which vehicle this is and how it moves."""
+
+    name: Name
+    """Its name in every key: beliefd/v1/<name>/estimate."""
+    motion: MotionModel = "unicycle"
+    """Motion model: unicycle for whatever drives with its nose ahead."""
+
+
+class Origin(Section):
+    """Where north = east = down = 0. Without it: learned from the first fix or from GPS_GLOBAL_ORIGIN."""
+
+    latitude: Latitude
+    """Degrees, WGS 84."""
+    longitude: Longitude
+    """Degrees, WGS 84."""
+    altitude: Number = 0.0
+    """Metres above mean sea level."""
+
+
+class Start(Section):
+    """What is known of the pose when the daemon starts."""
+
+    mode: Literal["given", "global", "first_fix"]
+    """given: about position; global: anywhere in [area]; first_fix: where the first position fix says. Default: given with a position, first_fix without."""
+    position: NorthEastDown | None = None
+    """Metres north, east and down of the origin."""
+    heading: (
+        Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-2 * math.pi, le=2 * math.pi)] | None
+    ) = None
+    """Radians clockwise from true north; without it: unknown."""
+    sigma: SigmaNorthEastDown = (0.5, 0.5, 0.5)
+    """Standard deviation of the position, metres north, east, down."""
+    sigma_heading: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=math.pi)] | None = None
+    """Standard deviation of the heading, rad. Default: 0.1 when a heading is given, else the heading could be any."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        given = dict(cast("dict[str, Any]", data))
+        given.setdefault("mode", "given" if given.get("position") is not None else "first_fix")
+        if given.get("heading") is not None:
+            given.setdefault("sigma_heading", 0.1)
+        return given
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Start:
+        if self.mode == "given" and self.position is None:
+            raise PydanticCustomError("start", 'mode = "given" needs a position (north, east, down)')
+        if self.mode != "given" and self.position is not None:
+            raise PydanticCustomError(
+                "start", 'position belongs to mode = "given", and the mode is "{mode}"', {"mode": self.mode}
+            )
+        if self.heading is None and self.sigma_heading is not None:
+            raise PydanticCustomError("start", "sigma_heading needs a heading beside it")
+        return self
+
+
+class Area(Section):
+    """Bounds for a global start."""
+
+    north: Interval
+    """Lowest and highest north, metres."""
+    east: Interval
+    """Lowest and highest east, metres."""
+
+
+class Motion(Section):
+    """Process noise of the motion model and where its inputs come from. Densities grow with the root of time."""
+
+    speed_noise: NotNegative = 0.1
+    """Noise of the speed, m/s per √s of travel: after t seconds the distance is uncertain by speed_noise·√t metres."""
+    yaw_rate_noise: NotNegative = 0.02
+    """Noise of the yaw rate, rad per √s: after t seconds the heading is uncertain by yaw_rate_noise·√t."""
+    slip_noise: NotNegative = 0.05
+    """Noise of the distance in proportion to speed: sigma of the speed is this share of it, per √s."""
+    turn_noise: NotNegative = 0.01
+    """Noise of the turn in proportion to yaw rate: sigma of the rate is this share of it, per √s."""
+    gyro_bias_walk: NotNegative = 1e-4
+    """Random walk of the gyro's bias, rad/s per √s."""
+    gyro_bias_sigma: NotNegative = 0.01
+    """What the gyro's bias may be at the start, rad/s (one standard deviation)."""
+    odometry_scale_walk: NotNegative = 1e-4
+    """Random walk of the odometry's scale, per √s."""
+    odometry_scale_sigma: NotNegative = 0.02
+    """What the odometry's scale may be off by at the start (one standard deviation; 0.02 is 2 %)."""
+    speed_from: Annotated[str, Field(min_length=1)] = "auto"
+    """Source of the speed: a message name as the wire has it (WHEEL_DISTANCE, esc.Status, …) or auto."""
+    yaw_rate_from: Annotated[str, Field(min_length=1)] = "auto"
+    """Source of the yaw rate: a message name (RAW_IMU, HIGHRES_IMU, ahrs.RawIMU, …), wheels, or auto."""
+    wheel_track: Positive | None = None
+    """Distance between the left and the right wheels, metres: yaw rate from two wheels that differ."""
+    wheel_radius: Positive | None = None
+    """Radius of the driven wheels, metres: speed from motor revolutions (esc.Status, RPM)."""
+
+
+class Sensor(Section):
+    """One kind of reading that corrects the belief, and how far it can be trusted."""
+
+    kind: SensorKind
+    """What is measured."""
+    link: Name | None = None
+    """Name of the link it comes by; without it: any."""
+    source: Annotated[str, Field(min_length=1)] | None = None
+    """Only readings that the wire names so (GPS_RAW_INT, GPS2_RAW, gnss.Fix2, sample/uwb); without it: any."""
+    sigma: Positive | None = None
+    """Standard deviation of an honest reading: m, m/s or rad. Without it: what the reading itself says."""
+    outliers: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=1)] = 0.05
+    """Share of readings that mean nothing."""
+    estimate: tuple[SlowState, ...] = ()
+    """Slow states to estimate with the pose: scale, bias, delay."""
+    delay_ms: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=10_000)] = 0.0
+    """Known latency before the stamp, ms (ArduPilot SITL GPS: 90)."""
+    scale_sigma: NotNegative = 0.05
+    """What an estimated scale may be off by at the start (one standard deviation)."""
+    bias_sigma: NotNegative = 0.2
+    """What an estimated bias may be at the start, in the reading's unit (one standard deviation)."""
+    declination_deg: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-180, le=180)] = 0.0
+    """For a magnetic heading: degrees that magnetic north lies east of true north."""
+    beacons: tuple[Annotated[Whole, Field(ge=0, le=65535)], ...] | None = None
+    """Only ranges to these beacons; without it: to every [[beacon]]."""
+
+
+class Beacon(Section):
+    """One beacon or anchor that ranges are measured to."""
+
+    id: Annotated[Whole, Field(ge=0, le=65535)]
+    """Its number on the wire."""
+    position: NorthEastDown | None = None
+    """Metres north, east and down of the origin."""
+    latitude: Latitude | None = None
+    """Degrees, WGS 84; instead of position."""
+    longitude: Longitude | None = None
+    """Degrees, WGS 84; instead of position."""
+    altitude: Number | None = None
+    """Metres above mean sea level; instead of position."""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Beacon:
+        geodetic = (self.latitude, self.longitude, self.altitude)
+        given = sum(value is not None for value in geodetic)
+        if (self.position is None) == (given == 0) or given not in (0, 3):
+            raise PydanticCustomError(
+                "beacon",
+                "needs position (north, east, down), or latitude, longitude and altitude, not both or parts",
+            )
+        return self
+
+
+class Map(Section):
+    """What is known of the surroundings."""
+
+    terrain: str = ""
+    """Elevation: .hgt(.zip) or GeoTIFF; a path relative to the configuration file, or absolute."""
+    occupancy: str = ""
+    """Occupancy grid: ROS map .yaml with its .pgm or .png."""
+    landmarks: str = ""
+    """CSV of landmarks: id,north,east."""

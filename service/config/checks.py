@@ -1,0 +1,152 @@
+"""What no section can see alone: names that must exist elsewhere in the file, files that must exist on the disk.
+
+These checks read the file as it came, so that they speak in the same breath as the errors of its sections. They
+say nothing about what is not of the expected type: the sections do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from service.config.complaints import did_you_mean, place_in_words
+from service.config.section import shown
+
+Table = Mapping[str, Any]
+
+# What the file may name already and this version does not do yet; the words say what it does.
+_NOT_BUILT: dict[tuple[str, str], tuple[frozenset[object], str]] = {
+    ("vehicle", "motion"): (frozenset({"constant_velocity", "drift", "inertial"}), "unicycle"),
+    ("sensor", "kind"): (
+        frozenset({"bearing", "range_bearing", "altitude", "terrain", "scan"}),
+        "position, velocity, range, heading, speed",
+    ),
+    ("link", "send"): (frozenset({"odometry", "gps_input", "global_position_sensor"}), "none"),
+}
+
+FILES = (
+    ("link", "signing_key_file"),
+    ("link", "dbc"),
+    ("map", "terrain"),
+    ("map", "occupancy"),
+    ("map", "landmarks"),
+)
+FILES_OF_PUBLISH = (("publish", "zenoh"),)
+
+
+def table(raw: Table, name: str) -> Table:
+    """Return a table of the file, empty where there is none or it is something else."""
+    value = raw.get(name)
+    return cast("Table", value) if isinstance(value, Mapping) else {}
+
+
+def entries(raw: Table, name: str) -> Iterator[tuple[tuple[int | str, ...], Table]]:
+    """Return the tables under a name with their places: one for ``[map]``, each for ``[[link]]``."""
+    value = raw.get(name)
+    if isinstance(value, Mapping):
+        yield (name,), cast("Table", value)
+    elif isinstance(value, list):
+        for index, entry in enumerate(cast("list[object]", value)):
+            if isinstance(entry, Mapping):
+                yield (name, index), cast("Table", entry)
+
+
+def _repeated(raw: Table, name: str, key: str) -> Iterator[str]:
+    first: dict[object, int] = {}
+    for place, entry in entries(raw, name):
+        value, index = entry.get(key), int(place[1]) if len(place) > 1 else 0
+        if not isinstance(value, str | int):
+            continue
+        if value in first:
+            where = place_in_words((*place, key), raw)
+            yield f"{where}: {shown(value)} is taken by {name} {first[value] + 1}; each {name} needs its own {key}"
+        first.setdefault(value, index)
+
+
+def _unknown_links(raw: Table) -> Iterator[str]:
+    names = [link["name"] for _, link in entries(raw, "link") if isinstance(link.get("name"), str)]
+    if not names:  # a site: its recording has the links
+        return
+    for place, sensor in entries(raw, "sensor"):
+        link = sensor.get("link")
+        if isinstance(link, str) and link not in names:
+            where = place_in_words((*place, "link"), raw)
+            yield f"{where}: no link {shown(link)}, there is {', '.join(names)}{did_you_mean(link, names)}"
+
+
+def _unknown_beacons(raw: Table) -> Iterator[str]:
+    known = [beacon.get("id") for _, beacon in entries(raw, "beacon")]
+    for place, sensor in entries(raw, "sensor"):
+        wanted = sensor.get("beacons")
+        for beacon in cast("list[object]", wanted) if isinstance(wanted, list) else []:
+            if isinstance(beacon, int) and beacon not in known:
+                yield f"{place_in_words((*place, 'beacons'), raw)}: no [[beacon]] with id {beacon}"
+
+
+def _area_of_a_global_start(raw: Table) -> Iterator[str]:
+    if table(raw, "start").get("mode") == "global" and "area" not in raw:
+        yield 'area: is missing; start, mode = "global" needs [area] with north = [lowest, highest] and east'
+
+
+def _budget_within_a_tick(raw: Table) -> Iterator[str]:
+    rate, spent = table(raw, "loop").get("rate", 50.0), table(raw, "budget").get("cpu_ms", 4.0)
+    if isinstance(rate, int | float) and isinstance(spent, int | float) and rate > 0 and spent * rate > 1000:
+        yield f"budget, cpu_ms: needs at most one tick ({1000 / rate:g} ms at loop, rate = {rate:g}), got {spent:g}"
+
+
+def _not_built(raw: Table) -> Iterator[str]:
+    for (name, key), (planned, built) in _NOT_BUILT.items():
+        for place, entry in entries(raw, name):
+            value = entry.get(key)
+            if isinstance(value, str) and value in planned:
+                where = place_in_words((*place, key), raw)
+                yield f"{where}: {shown(value)} is not in this version, which has: {built}"
+
+
+def resolved(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the file's content with the paths it names taken relative to the file's folder."""
+    named = {key for _, key in (*FILES, *FILES_OF_PUBLISH)}
+
+    def absolute(entry: Any) -> Any:
+        if not isinstance(entry, dict):
+            return entry
+        facts = cast("dict[str, Any]", entry)
+        return {
+            key: str(folder / value) if key in named and isinstance(value, str) and value else value
+            for key, value in facts.items()
+        }
+
+    content = dict(raw)
+    for name in {name for name, _ in (*FILES, *FILES_OF_PUBLISH)}:
+        value = content.get(name)
+        content[name] = (
+            [absolute(entry) for entry in cast("list[Any]", value)] if isinstance(value, list) else value
+        )
+        if isinstance(value, dict):
+            content[name] = absolute(value)
+        elif value is None:
+            content.pop(name, None)
+    return content
+
+
+def _absent_files(raw: Table) -> Iterator[str]:
+    for name, key in (*FILES, *FILES_OF_PUBLISH):
+        for place, entry in entries(raw, name):
+            path = entry.get(key)
+            if isinstance(path, str) and path and "\0" not in path and not Path(path).is_file():
+                yield f"{place_in_words((*place, key), raw)}: needs a file that exists, there is no {path}"
+
+
+def across_sections(raw: Table) -> list[str]:
+    """Return every error that lies between sections, or between the file and the disk."""
+    return [
+        *_repeated(raw, "link", "name"),
+        *_repeated(raw, "beacon", "id"),
+        *_unknown_links(raw),
+        *_unknown_beacons(raw),
+        *_area_of_a_global_start(raw),
+        *_budget_within_a_tick(raw),
+        *_not_built(raw),
+        *_absent_files(raw),
+    ]

@@ -1,0 +1,127 @@
+"""The links: where the bytes come from. One process each."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from service.config.section import Flag, Name, Number, Section, Whole, shown
+
+
+def _scalar(value: Any) -> Any:
+    if not isinstance(value, str | bool | int | float):
+        raise PydanticCustomError(
+            "scalar", "needs text, a number, true or false, got {got}", {"got": shown(value)}
+        )
+    return value
+
+
+Option = Annotated[Any, BeforeValidator(_scalar)]
+
+
+class ServoCalibration(Section):
+    """What the pulse of one servo output means, from -1 to 1."""
+
+    channel: Annotated[Whole, Field(ge=1, le=32)]
+    """Output as SERVO_OUTPUT_RAW numbers it, from 1."""
+    low: Annotated[Whole, Field(ge=500, le=2500)] = 1000
+    """Pulse at -1, µs."""
+    trim: Annotated[Whole, Field(ge=500, le=2500)] = 1500
+    """Pulse at 0, µs."""
+    high: Annotated[Whole, Field(ge=500, le=2500)] = 2000
+    """Pulse at 1, µs."""
+    reversed: Flag = False
+    """The channel turns the other way: the sign is changed."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> ServoCalibration:
+        if not self.low <= self.trim <= self.high or self.low == self.high:
+            raise PydanticCustomError(
+                "servo",
+                "needs low <= trim <= high, got {low}, {trim}, {high}",
+                {"low": self.low, "trim": self.trim, "high": self.high},
+            )
+        return self
+
+
+class MavlinkLink(Section):
+    """A MAVLink connection: UDP, TCP or serial."""
+
+    name: Name
+    """What sensors, logs and status call this link."""
+    kind: Literal["mavlink"]
+    """Always "mavlink" for this kind of link."""
+    url: Annotated[str, Field(min_length=1)]
+    """As pymavlink writes it: udpin:0.0.0.0:14550, udpout:…, tcp:host:port, tcpin:…, /dev/ttyACM0,115200."""
+    system: Annotated[Whole, Field(ge=1, le=255)] | None = None
+    """Listen only to this MAVLink system; without it: to the first autopilot heard."""
+    components: tuple[Annotated[Whole, Field(ge=1, le=255)], ...] = ()
+    """Listen only to these MAVLink components; empty: to all of the system."""
+    signing_key_file: str = ""
+    """File with the 32-byte signing key (raw or 64 hexadecimal digits). When set, unsigned or badly signed messages are refused and counted."""
+    send: Literal["none", "odometry", "gps_input", "global_position_sensor"] = "none"
+    """What goes back to the autopilot."""
+    rates: dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1000)]] = {}
+    """Messages to ask for and how often, Hz: { RAW_IMU = 50, RANGING_BEACON = 10 }; 0 asks for none. Added to the default requests."""
+    servo: tuple[ServoCalibration, ...] = ()
+    """Calibration of SERVO_OUTPUT_RAW, one [[link.servo]] for each output that moves the vehicle."""
+
+
+class Signal(Section):
+    """Which signal of a DBC file is what."""
+
+    signal: Annotated[str, Field(pattern=r"^[^.\s]+\.[^.\s]+$")]
+    """MESSAGE.SIGNAL as the DBC file names them."""
+    measures: Literal["speed", "yaw_rate", "heading", "distance", "motor_speed", "altitude"]
+    """What it measures, in SI units once scaled: m/s, rad/s, rad, m, rad/s, m."""
+    scale: Number = 1.0
+    """Factor from the signal's unit to SI: 0.2778 for km/h, 0.0174533 for degrees."""
+    offset: Number = 0.0
+    """Added after scaling, in SI units."""
+    index: Annotated[Whole, Field(ge=0, le=15)] = 0
+    """Which wheel or motor, where there are several (distance, motor_speed)."""
+
+
+class CanLink(Section):
+    """A CAN bus: DroneCAN, or a car's bus read with a DBC file."""
+
+    name: Name
+    """What sensors, logs and status call this link."""
+    kind: Literal["can"]
+    """Always "can" for this kind of link."""
+    interface: Annotated[str, Field(pattern=r"^[a-z0-9_]+$")] = "socketcan"
+    """Any python-can interface (socketcan, slcan, udp_multicast, virtual, …), or mcast: ArduPilot SITL's bus."""
+    channel: Annotated[str, Field(min_length=1)]
+    """Channel of that interface: can0, vcan0, /dev/ttyACM0, 239.74.163.2."""
+    protocol: Literal["dronecan", "dbc"] = "dronecan"
+    """How the frames are understood."""
+    dbc: str = ""
+    """The DBC file, for protocol = "dbc"; a path relative to the configuration file, or absolute."""
+    bitrate: Annotated[Whole, Field(ge=10_000, le=8_000_000)] | None = None
+    """Bit/s, for interfaces that set it themselves (slcan, pcan); SocketCAN's is set by ip link."""
+    options: dict[str, Option] = {}
+    """Further arguments for python-can's interface."""
+    signal: tuple[Signal, ...] = ()
+    """Which signal is what, one [[link.signal]] each, for protocol = "dbc"."""
+
+    @model_validator(mode="after")
+    def _dbc_has_its_facts(self) -> CanLink:
+        if self.protocol == "dbc" and not (self.dbc and self.signal):
+            raise PydanticCustomError(
+                "dbc", 'protocol = "dbc" needs dbc (the file) and at least one [[link.signal]]'
+            )
+        return self
+
+
+class ZenohLink(Section):
+    """Samples that others publish under <prefix>/<vehicle>/sample/<sensor>."""
+
+    name: Name
+    """What sensors, logs and status call this link."""
+    kind: Literal["zenoh"]
+    """Always "zenoh" for this kind of link."""
+
+
+Link = Annotated[MavlinkLink | CanLink | ZenohLink, Field(discriminator="kind")]
