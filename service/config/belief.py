@@ -62,7 +62,9 @@ class Start(Section):
     """What is known of the pose when the daemon starts."""
 
     mode: Literal["given", "global", "first_fix"]
-    """given: about position; global: anywhere in [area]; first_fix: where the first position fix says. Default: given with a position, first_fix without."""
+    """given: about position; global: anywhere in [area]; first_fix: where the first position fix says.
+
+    Default: given with a position, first_fix without."""
     position: NorthEastDown | None = None
     """Metres north, east and down of the origin."""
     heading: (
@@ -72,7 +74,9 @@ class Start(Section):
     sigma: SigmaNorthEastDown = (0.5, 0.5, 0.5)
     """Standard deviation of the position, metres north, east, down."""
     sigma_heading: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=math.pi)] | None = None
-    """Standard deviation of the heading, rad. Default: 0.1 when a heading is given, else the heading could be any."""
+    """Standard deviation of the heading, rad.
+
+    Default: 0.1 with a heading; without one the heading could be any."""
 
     @model_validator(mode="before")
     @classmethod
@@ -108,10 +112,10 @@ class Area(Section):
 
 
 class Motion(Section):
-    """Process noise of the motion model and where its inputs come from. Densities grow with the root of time."""
+    """Process noise of the motion model, and where its inputs come from."""
 
     speed_noise: NotNegative = 0.1
-    """Noise of the speed, m/s per √s of travel: after t seconds the distance is uncertain by speed_noise·√t metres."""
+    """Noise of the speed, m per √s: after t seconds the distance is uncertain by speed_noise·√t metres."""
     yaw_rate_noise: NotNegative = 0.02
     """Noise of the yaw rate, rad per √s: after t seconds the heading is uncertain by yaw_rate_noise·√t."""
     slip_noise: NotNegative = 0.05
@@ -144,7 +148,7 @@ class Sensor(Section):
     link: Name | None = None
     """Name of the link it comes by; without it: any."""
     source: Annotated[str, Field(min_length=1)] | None = None
-    """Only readings that the wire names so (GPS_RAW_INT, GPS2_RAW, gnss.Fix2, sample/uwb); without it: any."""
+    """Only readings that the wire names so (GPS2_RAW, gnss.Fix2, sample/uwb); without it: any."""
     sigma: Positive | None = None
     """Standard deviation of an honest reading: m, m/s or rad. Without it: what the reading itself says."""
     outliers: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=1)] = 0.05

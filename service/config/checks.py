@@ -1,7 +1,7 @@
-"""What no section can see alone: names that must exist elsewhere in the file, files that must exist on the disk.
+"""What no section can see alone: names that must be elsewhere in the file, files that must be on the disk.
 
-These checks read the file as it came, so that they speak in the same breath as the errors of its sections. They
-say nothing about what is not of the expected type: the sections do.
+These checks read the file as it came, so that they speak in the same breath as the errors of its sections.
+They say nothing about what is not of the expected type: the sections do.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from service.config.complaints import did_you_mean, place_in_words
+from service.config.complaints import did_you_mean
+from service.config.places import place_in_words
 from service.config.section import shown
 
 Table = Mapping[str, Any]
@@ -60,7 +61,8 @@ def _repeated(raw: Table, name: str, key: str) -> Iterator[str]:
             continue
         if value in first:
             where = place_in_words((*place, key), raw)
-            yield f"{where}: {shown(value)} is taken by {name} {first[value] + 1}; each {name} needs its own {key}"
+            taken = f"{shown(value)} is taken by {name} {first[value] + 1}"
+            yield f"{where}: {taken}; each {name} needs its own {key}"
         first.setdefault(value, index)
 
 
@@ -91,8 +93,11 @@ def _area_of_a_global_start(raw: Table) -> Iterator[str]:
 
 def _budget_within_a_tick(raw: Table) -> Iterator[str]:
     rate, spent = table(raw, "loop").get("rate", 50.0), table(raw, "budget").get("cpu_ms", 4.0)
-    if isinstance(rate, int | float) and isinstance(spent, int | float) and rate > 0 and spent * rate > 1000:
-        yield f"budget, cpu_ms: needs at most one tick ({1000 / rate:g} ms at loop, rate = {rate:g}), got {spent:g}"
+    if not isinstance(rate, int | float) or not isinstance(spent, int | float):
+        return
+    if rate > 0 and spent * rate > 1000:
+        tick = f"{1000 / rate:g} ms at loop, rate = {rate:g}"
+        yield f"budget, cpu_ms: needs at most one tick ({tick}), got {spent:g}"
 
 
 def _not_built(raw: Table) -> Iterator[str]:

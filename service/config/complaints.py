@@ -1,22 +1,21 @@
 """What is wrong with a configuration, in the words of the file rather than of the validator.
 
-Every error names its place as the file shows it (``beacon 7, position``; ``link "bus" (link 2), channel``), what would
-be right there, and what was found.
+Every error names its place as the file shows it (``beacon 7, position``; ``link "bus" (link 2), channel``),
+what would be right there, and what was found.
 """
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, cast
+from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from service.config import structure
+from service.config.places import place_in_words
 from service.config.section import Section, shown
-
-Place = tuple[int | str, ...]
 
 
 class ConfigurationError(Exception):
@@ -34,60 +33,9 @@ class ConfigurationError(Exception):
 
 
 def did_you_mean(wrong: object, possible: Iterable[str]) -> str:
-    """Return ``; did you mean "rate"?`` for the closest of the possible words, or nothing when none is close."""
+    """Return ``; did you mean "rate"?`` for the closest possible word, or nothing when none is close."""
     close = difflib.get_close_matches(str(wrong), list(possible), n=1, cutoff=0.6)
     return f'; did you mean "{close[0]}"?' if close else ""
-
-
-def _entry(table: str, index: int, entry: object) -> str:
-    """Name one entry of an array of tables: beacons by their number, links by their name, the rest by their kind."""
-    facts = cast("Mapping[str, object]", entry) if isinstance(entry, Mapping) else {}
-    identity, name, kind = facts.get("id"), facts.get("name"), facts.get("kind")
-    if table == "beacon" and isinstance(identity, int) and not isinstance(identity, bool):
-        return f"beacon {identity}"
-    if table == "link" and isinstance(name, str) and name:
-        return f'link "{name}" (link {index + 1})'
-    if table == "sensor" and isinstance(kind, str) and kind:
-        return f"sensor {index + 1} ({kind})"
-    return f"{table} {index + 1}"
-
-
-def _step(current: object, step: int | str) -> object:
-    if isinstance(step, str) and isinstance(current, Mapping):
-        return cast("Mapping[str, object]", current).get(step)
-    if isinstance(step, int) and isinstance(current, list | tuple):
-        items = cast("list[object]", current)
-        return items[step] if 0 <= step < len(items) else None
-    return None
-
-
-def place_in_words(place: Place, raw: object) -> str:
-    """Return a place as the file shows it: ``link "bus" (link 2), signal 3, scale``."""
-    words: list[str] = []
-    current: object = raw
-    previous = ""
-    for step in place:
-        if isinstance(step, int):
-            current = _step(current, step)
-            if (
-                isinstance(current, Mapping)
-                or not words
-                or previous in ("link", "sensor", "beacon", "signal", "servo")
-            ):
-                words[-1:] = [_entry(previous, step, current)]
-            else:
-                words.append(f"number {step + 1}")
-        elif isinstance(current, Mapping) and step not in current and previous == "link":
-            facts = cast("Mapping[str, object]", current)
-            if facts.get("kind") == step:
-                continue  # the tag that chose among the kinds of link is no key of the file
-            words.append(step)
-            current = None
-        else:
-            words.append(step)
-            current = _step(current, step)
-        previous = step if isinstance(step, str) else previous
-    return ", ".join(words)
 
 
 def _limit(relation: str, key: str) -> Callable[[ErrorDetails], str]:
@@ -158,8 +106,14 @@ def _described(error: ErrorDetails, root: type[Section]) -> str:
 
 def complaints(error: ValidationError, raw: Mapping[str, Any], root: type[Section]) -> list[str]:
     """Return every error of a validation as ``place: what is wrong``, in the order of the file's sections."""
+    order = ("vehicle", "origin", "start", "area", "loop", "budget", "link")
+
+    def section(detail: ErrorDetails) -> int:
+        first = str(detail["loc"][0]) if detail["loc"] else ""
+        return order.index(first) if first in order else len(order)
+
     found: list[str] = []
-    for detail in error.errors(include_url=False):
+    for detail in sorted(error.errors(include_url=False), key=section):
         place = detail["loc"]
         if detail["type"].startswith("union_tag"):
             place = (*place, "kind")

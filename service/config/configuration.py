@@ -12,11 +12,9 @@ from service.config.running import Budget, Loop, Publish, State
 from service.config.section import Section
 
 
-class Site(Section):
-    """A file that may leave out the vehicle and its links: what a recording knows of the place it was made at."""
+class Sections(Section):
+    """What every file may say, whether it describes a vehicle or only a place."""
 
-    vehicle: Vehicle | None = None
-    """[vehicle]"""
     origin: Origin | None = None
     """[origin]"""
     start: Start = Start(mode="first_fix")
@@ -27,8 +25,6 @@ class Site(Section):
     """[loop]"""
     budget: Budget = Budget()
     """[budget]"""
-    link: tuple[Link, ...] = ()
-    """[[link]]"""
     motion: Motion = Motion()
     """[motion]"""
     sensor: tuple[Sensor, ...] = ()
@@ -43,7 +39,27 @@ class Site(Section):
     """[state]"""
 
 
-class Configuration(Site):
+class Site(Sections):
+    """What is known of the place that a recording was made at; the vehicle and its links may be left out."""
+
+    vehicle: Vehicle | None = None
+    """[vehicle]"""
+    link: tuple[Link, ...] = ()
+    """[[link]]"""
+
+    def configuration(
+        self, vehicle: Vehicle, link: tuple[Link, ...], sensor: tuple[Sensor, ...]
+    ) -> Configuration:
+        """Return the configuration of a vehicle at this place; what the file says goes first."""
+        return Configuration(
+            vehicle=self.vehicle or vehicle,
+            link=self.link or link,
+            sensor=self.sensor or sensor,
+            **{name: getattr(self, name) for name in Sections.model_fields if name != "sensor"},
+        )
+
+
+class Configuration(Sections):
     """A file that says everything the daemon needs."""
 
     vehicle: Vehicle

@@ -60,11 +60,15 @@ class MavlinkLink(Section):
     components: tuple[Annotated[Whole, Field(ge=1, le=255)], ...] = ()
     """Listen only to these MAVLink components; empty: to all of the system."""
     signing_key_file: str = ""
-    """File with the 32-byte signing key (raw or 64 hexadecimal digits). When set, unsigned or badly signed messages are refused and counted."""
+    """File with the signing key, 32 bytes or 64 hexadecimal digits.
+
+    When set, unsigned or badly signed messages are refused and counted."""
     send: Literal["none", "odometry", "gps_input", "global_position_sensor"] = "none"
     """What goes back to the autopilot."""
-    rates: dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1000)]] = {}
-    """Messages to ask for and how often, Hz: { RAW_IMU = 50, RANGING_BEACON = 10 }; 0 asks for none. Added to the default requests."""
+    rates: dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1000)]] = Field(
+        default_factory=dict
+    )
+    """Messages to ask for beside the usual ones and how often, Hz: { RAW_IMU = 50 }; 0 asks for none."""
     servo: tuple[ServoCalibration, ...] = ()
     """Calibration of SERVO_OUTPUT_RAW, one [[link.servo]] for each output that moves the vehicle."""
 
@@ -92,7 +96,7 @@ class CanLink(Section):
     kind: Literal["can"]
     """Always "can" for this kind of link."""
     interface: Annotated[str, Field(pattern=r"^[a-z0-9_]+$")] = "socketcan"
-    """Any python-can interface (socketcan, slcan, udp_multicast, virtual, …), or mcast: ArduPilot SITL's bus."""
+    """Any python-can interface (socketcan, slcan, udp_multicast, …), or mcast: ArduPilot SITL's bus."""
     channel: Annotated[str, Field(min_length=1)]
     """Channel of that interface: can0, vcan0, /dev/ttyACM0, 239.74.163.2."""
     protocol: Literal["dronecan", "dbc"] = "dronecan"
@@ -101,7 +105,7 @@ class CanLink(Section):
     """The DBC file, for protocol = "dbc"; a path relative to the configuration file, or absolute."""
     bitrate: Annotated[Whole, Field(ge=10_000, le=8_000_000)] | None = None
     """Bit/s, for interfaces that set it themselves (slcan, pcan); SocketCAN's is set by ip link."""
-    options: dict[str, Option] = {}
+    options: dict[str, Option] = Field(default_factory=dict)
     """Further arguments for python-can's interface."""
     signal: tuple[Signal, ...] = ()
     """Which signal is what, one [[link.signal]] each, for protocol = "dbc"."""

@@ -12,7 +12,7 @@ from service.config.checks import across_sections, resolved
 from service.config.complaints import ConfigurationError, complaints
 from service.config.configuration import Configuration, Site
 
-SiteType = TypeVar("SiteType", bound=Site)
+SiteType = TypeVar("SiteType", Configuration, Site)
 
 
 def _content(path: Path) -> dict[str, Any]:

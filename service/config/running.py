@@ -16,7 +16,7 @@ class Loop(Section):
     rate: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1, le=1000)] = 50.0
     """Ticks per second."""
     horizon_ms: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=5000)] = 250.0
-    """How far the filter stays behind now, ms, so that late samples come in order: the slowest sensor's latency."""
+    """How far the filter stays behind now, ms, so that late samples come in order: the slowest sensor."""
     priority: Annotated[Whole, Field(ge=0, le=99)] = 0
     """SCHED_FIFO priority; 0: ordinary scheduling."""
     cpus: tuple[Annotated[Whole, Field(ge=0, le=1023)], ...] = ()
@@ -52,7 +52,9 @@ class Publish(Section):
     prefix: Annotated[str, Field(pattern=r"^[^/#?$*\s]+(/[^/#?$*\s]+)*$")] = "beliefd/v1"
     """Start of every key: <prefix>/<vehicle>/estimate."""
     zenoh: str = ""
-    """A Zenoh JSON5 configuration file. Default: a peer on tcp/127.0.0.1:7447, or connected to whoever listens there already."""
+    """A Zenoh JSON5 configuration file.
+
+    Default: a peer on tcp/127.0.0.1:7447, or connected to whoever listens there already."""
     ros2_domain: Annotated[Whole, Field(ge=-1, le=232)] = -1
     """From 0: mirror as ROS 2 topics in that domain; -1: not."""
     particles: Annotated[Whole, Field(ge=0, le=3000)] = 1000

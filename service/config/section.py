@@ -1,7 +1,7 @@
 """What every table of the configuration file has in common, and the words its fields are made of.
 
-A section is immutable, knows its keys and refuses others. Numbers are strict (``"5"`` and ``true`` are no numbers)
-and finite. Vectors say in their errors what they hold and how much of it came.
+A section is immutable, knows its keys and refuses others. Numbers are strict (``"5"`` and ``true`` are no
+numbers) and finite. Vectors say in their errors what they hold and how much of it came.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic_core import PydanticCustomError
 
 
-class Section(BaseModel, frozen=True):
+class Section(BaseModel):
     """One table of the file: frozen, and no key but its own."""
 
-    model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

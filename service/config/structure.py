@@ -32,7 +32,7 @@ def kind_of(section: type[Section]) -> str | None:
 
 
 def at(root: type[Section], place: tuple[int | str, ...]) -> type[Section] | None:
-    """Return the section type at a pydantic location (keys, indices and union tags), or None where there is none."""
+    """Return the section type at a pydantic location (keys, indices, union tags), or None."""
     section: type[Section] = root
     candidates: list[type[Section]] = []
     for step in place:
