@@ -1,0 +1,1 @@
+"""What goes out: the publishing process and what it says on Zenoh."""

@@ -1,0 +1,194 @@
+"""The publishing process: from the loop's datagrams to Zenoh, never in anybody's way.
+
+One thread does everything: it waits for a datagram (and no longer than a query may wait), takes what has
+come, puts the newest of each topic, answers the queries, and looks after the session. When there is no
+session it says so, tries again with back-off, and goes on draining, so that the loop never notices.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import select
+import signal
+import socket
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+
+import zenoh
+
+from service.config import Configuration
+from service.publish.answers import Book, answers
+from service.publish.inbox import PROCESSES, Inbox, Value
+from service.publish.outlet import Outlet
+from service.publish.session import Opened, SessionError, close, open_embedded, open_from_file, plain
+from service.publish.topics import ESTIMATE, HEALTH, HISTORY, SLOW, Keys
+
+log = logging.getLogger(__name__)
+
+_QUERY_WAIT_MS = 20
+_SLOW_PERIOD = 0.2
+_UPKEEP_PERIOD = 1.0
+_BACK_OFF = (0.5, 8.0)
+_CLOSING = 1.0
+
+
+def run(configuration: Configuration, estimates: socket.socket) -> None:
+    """Publish until SIGTERM, or until the supervisor has gone.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Says whose keys, and which session.
+    estimates : socket.socket
+        The receiving end of the datagram socket pair that the loop and the supervisor write to.
+
+    Notes
+    -----
+    Leaves by :func:`os._exit` when Zenoh does not close its session within a second: a stalled peer can
+    hold it for ten, and hang the interpreter's exit altogether.
+    """
+    stop = False
+
+    def _stop(_signal: int, _frame: object) -> None:
+        nonlocal stop
+        stop = True
+
+    signal.signal(signal.SIGTERM, _stop)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the supervisor too, which then says stop
+    supervisor = os.getppid()
+    publisher = Publisher(configuration, estimates, opener(configuration))
+    while not stop and os.getppid() == supervisor:
+        publisher.step()
+    if not publisher.close(_CLOSING):
+        log.warning("the Zenoh session did not close within %g s: leaving without it", _CLOSING)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
+
+
+def opener(configuration: Configuration) -> Callable[[], Opened]:
+    """Return what opens the session that the configuration asks for."""
+    path = configuration.publish.zenoh
+    if path:
+        return lambda: open_from_file(path)
+    return open_embedded
+
+
+class Publisher:
+    """The loop of the publishing process, one :meth:`step` at a time.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Whose keys, and what ``@rpc/config`` answers.
+    estimates : socket.socket
+        Where the datagrams come from.
+    open_session : callable
+        Opens a session or raises :class:`~service.publish.session.SessionError`.
+    """
+
+    def __init__(
+        self, configuration: Configuration, estimates: socket.socket, open_session: Callable[[], Opened]
+    ) -> None:
+        self._open_session = open_session
+        self._keys = Keys(configuration.publish.prefix, configuration.vehicle.name)
+        self._inbox = Inbox(estimates)
+        self._book = Book()
+        self._answers = answers(configuration, self._book, self._inbox)
+        self._outlet: Outlet | None = None
+        self._changes: deque[Value] = deque(maxlen=HISTORY)
+        self._slow_at = 0.0
+        self._upkeep_at = 0.0
+        self._back_off = _BACK_OFF[0]
+        self._complaint = ""
+        self._poll = select.poll()
+        self._poll.register(estimates, select.POLLIN)
+
+    def step(self, wait_ms: int = _QUERY_WAIT_MS) -> None:
+        """Wait for a datagram, at most ``wait_ms``; publish what came, answer what was asked."""
+        if time.monotonic() >= self._upkeep_at:
+            self._look_after_session()
+        self._poll.poll(wait_ms)
+        for value in self._inbox.drain():
+            self._book.note(value)
+            self._publish(value)
+        if self._outlet is not None:
+            try:
+                self._outlet.answer()
+            except zenoh.ZError as error:
+                self._book.unsent["reply"] += 1
+                log.warning("a query could not be answered: %s", plain(error))
+
+    def close(self, seconds: float) -> bool:
+        """Close the session within ``seconds``; tell whether it is closed (or there was none)."""
+        outlet, self._outlet = self._outlet, None
+        return outlet is None or outlet.close(seconds)
+
+    def _publish(self, value: Value) -> None:
+        if value.topic == PROCESSES:
+            return
+        if value.topic == HEALTH.key:
+            self._changes.append(value)
+        self._put(value)
+        now = time.monotonic()
+        if value.topic == ESTIMATE.key and now >= self._slow_at:
+            # Steps of the period, so that the mean rate holds; after a pause it starts anew.
+            self._slow_at = max(self._slow_at + _SLOW_PERIOD, now)
+            self._put(Value(SLOW.key, value.payload))
+
+    def _put(self, value: Value) -> None:
+        if self._outlet is None:
+            self._book.unsent[value.topic] += 1
+            return
+        try:
+            self._book.seconds.append(self._outlet.put(value))
+        except zenoh.ZError as error:
+            self._book.unsent[value.topic] += 1
+            self._lose(plain(error))
+        else:
+            self._book.published[value.topic] += 1
+
+    def _look_after_session(self) -> None:
+        self._upkeep_at = time.monotonic() + _UPKEEP_PERIOD
+        if self._outlet is not None and self._outlet.orphaned():
+            self._lose("whoever listened has gone: taking its place")
+        if self._outlet is None:
+            self._open()
+
+    def _open(self) -> None:
+        try:
+            opened = self._open_session()
+        except SessionError as error:
+            self._retry_later(str(error))
+            return
+        try:
+            self._outlet = Outlet(opened, self._keys, self._answers)
+        except zenoh.ZError as error:
+            close(opened.session, _CLOSING)
+            self._retry_later(plain(error))
+            return
+        self._back_off = _BACK_OFF[0]
+        self._complaint = ""
+        self._book.session = opened.place
+        self._book.opened += 1
+        log.info("publishing %s, %s", self._keys.of("**"), opened.place)
+        for change in self._changes:  # a new session has an empty cache: late joiners still get the history
+            self._put(change)
+
+    def _retry_later(self, reason: str) -> None:
+        self._upkeep_at = time.monotonic() + self._back_off
+        if reason != self._complaint:
+            log.error("no Zenoh session: %s; trying again, at most every %g s", reason, _BACK_OFF[1])
+            self._complaint = reason
+        self._back_off = min(2 * self._back_off, _BACK_OFF[1])
+
+    def _lose(self, reason: str) -> None:
+        log.warning("the Zenoh session is given up: %s", reason)
+        self._book.session = "not open"
+        self._upkeep_at = 0.0
+        outlet, self._outlet = self._outlet, None
+        if outlet is not None:
+            outlet.close(_CLOSING)
