@@ -1,0 +1,99 @@
+"""Which readings cannot be true, whoever says them: the one place for the limits of what a driver lets in.
+
+A reading from outside is refused when a number is not finite or lies where physics, the Earth or the unit
+does not allow it. The limits are wide: they catch degrees where radians belong, sentinels and bit errors, not
+bad sensors, which the filter judges.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import cast
+
+import msgspec
+
+from drivers.sample import AnyReading
+
+_HALF_TURN = math.pi * (1.0 + 1e-9)
+_TURN = 2.0 * _HALF_TURN
+_TINY = 1e-9
+
+# Inclusive limits by field name, in the field's unit (m, m/s, rad, rad/s, m/s², T, Pa, K); a name means the
+# same in every reading. Local distances end where single precision loses the decimetre.
+_LIMITS: dict[str, tuple[float, float]] = {
+    "latitude": (-_HALF_TURN / 2.0, _HALF_TURN / 2.0),
+    "longitude": (-_HALF_TURN, _HALF_TURN),
+    "altitude": (-12_000.0, 100_000.0),
+    "north": (-1e6, 1e6),
+    "east": (-1e6, 1e6),
+    "down": (-1e6, 1e6),
+    "velocity": (-1e4, 1e4),
+    "speed": (-1e4, 1e4),
+    "sigma": (_TINY, 1e6),
+    "sigma_horizontal": (_TINY, 1e6),
+    "sigma_vertical": (_TINY, 1e6),
+    "satellites": (0, 255),
+    "angular_velocity": (-1e3, 1e3),
+    "specific_force": (-1e4, 1e4),
+    "magnetic_field": (-1.0, 1.0),
+    "yaw_rate": (-1e3, 1e3),
+    "roll": (-_TURN, _TURN),
+    "pitch": (-_TURN, _TURN),
+    "yaw": (-_TURN, _TURN),
+    "heading": (-_TURN, _TURN),
+    "beacon": (0, 2**31 - 1),
+    "orientation": (0, 255),
+    "absolute": (1.0, 1e9),
+    "differential": (-1e9, 1e9),
+    "temperature": (_TINY, 5_000.0),
+    "index": (0, 255),
+    "angular_speed": (-1e5, 1e5),
+    "channels": (-1.0, 1.0),
+}
+_DISTANCES: dict[str, tuple[float, float]] = {
+    "range": (0.0, 1e6),
+    "clearance": (0.0, 1e6),
+    "odometer": (-1e9, 1e9),
+}
+_ANYTHING = (-math.inf, math.inf)
+_LONGEST = 256
+
+_Wrong = Callable[[object], bool]
+
+
+def _outside(low: float, high: float) -> _Wrong:
+    def number(value: float) -> bool:
+        return not (low <= value <= high and math.isfinite(value))
+
+    def wrong(value: object) -> bool:
+        if value is None or isinstance(value, bool | str):
+            return False
+        if isinstance(value, tuple):
+            items = cast("Sequence[float | None]", value)
+            return len(items) > _LONGEST or any(item is not None and number(item) for item in items)
+        return number(cast("float", value))
+
+    return wrong
+
+
+def _checks(reading: type[AnyReading]) -> tuple[tuple[str, _Wrong], ...]:
+    config = msgspec.structs.fields(reading)
+    kind = str(reading.__struct_config__.tag)
+    limits = {**_LIMITS, "distance": _DISTANCES.get(kind, _ANYTHING)}
+    return tuple((field.name, _outside(*limits.get(field.name, _ANYTHING))) for field in config)
+
+
+_CHECKS: dict[type[AnyReading], tuple[tuple[str, _Wrong], ...]] = {}
+
+
+def implausible(reading: AnyReading) -> str | None:
+    """Return the name of the first field that cannot be true, or ``None`` when the reading may be used."""
+    kind = type(reading)
+    checks = _CHECKS.get(kind)
+    if checks is None:
+        checks = _CHECKS[kind] = _checks(kind)
+    for name, wrong in checks:
+        if wrong(getattr(reading, name)):
+            return name
+    return None
