@@ -1,0 +1,241 @@
+"""The real-time loop: every tick takes what the links said, lets the belief go on, and publishes it, on time.
+
+It waits for nobody, writes nothing to disk and logs nothing while it runs. Everything that it sends or takes
+is a datagram on a queue that the kernel bounds; what a queue refuses is counted and published.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Protocol
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.sample import Sample
+from service.budget import Meters
+from service.channels import BUDGET, ESTIMATE, HEALTH, SENSORS, Heart, Outlet, cloud
+from service.config import Configuration
+from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Sensors, SensorStatus
+from service.governor import Governor
+from service.inlet import Inlet
+from service.schedule import NANOSECONDS, Schedule
+
+INGEST_SHARE = 0.5
+"""Share of the budget that taking samples may use in one tick, all links together; the rest waits."""
+
+BEAT_RATE = 10.0
+CLOUD_RATE = 5.0
+
+_FIXED_STAGES = ("ingest", "publishing")
+_OTHER = "other"
+
+
+class Estimator(Protocol):
+    """What the loop needs of :class:`service.estimator.Estimator`."""
+
+    @property
+    def demand(self) -> int:
+        """Particles that the belief needs in the next tick."""
+        ...
+
+    @property
+    def drops(self) -> dict[str, int]:
+        """Samples that were not used, by reason."""
+        ...
+
+    def ingest(self, samples: Iterable[Sample]) -> None:
+        """Take samples in."""
+        ...
+
+    def tick(self, now_ns: int, unix_ns: int, afforded: int) -> Estimate:
+        """Bring the belief to now."""
+        ...
+
+    def sensors(self, now_ns: int) -> list[SensorStatus]:
+        """Return every sensor as the belief sees it."""
+        ...
+
+    def cloud(self, count: int) -> NDArray[np.float32]:
+        """Return at most ``count`` particles, shape (n, 4): north, east, heading, weight."""
+        ...
+
+
+class Loop:
+    """Ticks at the configured rate.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Rate, budget and bounds, and how many particles go out.
+    estimator : Estimator
+        The belief; its stopwatch is ``meters``.
+    meters : Meters
+        What measures the ticks.
+    inlets : Sequence[Inlet]
+        One for each link.
+    outlet : Outlet
+        Queue to the publisher.
+    heart : Heart
+        Line to the supervisor.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        estimator: Estimator,
+        meters: Meters,
+        inlets: Sequence[Inlet],
+        outlet: Outlet,
+        heart: Heart,
+    ) -> None:
+        self._rate = configuration.loop.rate
+        self._budget_ms = configuration.budget.cpu_ms
+        self._cloud_count = configuration.publish.particles
+        self._estimator = estimator
+        self._meters = meters
+        self._inlets = inlets
+        self._outlet = outlet
+        self._heart = heart
+        self._governor = Governor(
+            self._budget_ms * 1e-3, configuration.budget.particles_min, configuration.budget.particles_max
+        )
+        slices = max(1, len(inlets))
+        self._slice_ns = round(INGEST_SHARE * self._budget_ms * 1e-3 * NANOSECONDS / slices)
+        self._second = max(1, round(self._rate))
+        self._beat_every = max(1, round(self._rate / BEAT_RATE))
+        self._cloud_every = max(1, round(self._rate / CLOUD_RATE))
+        self._schedule = Schedule(self._rate, 0)
+        self._encoder = msgspec.json.Encoder()
+        self._datagram = bytearray(4096)
+        self._health: Health | None = None
+        self.ticks = 0
+        """Ticks done."""
+        self.overruns = 0
+        """Ticks that cost more than the budget."""
+
+    @property
+    def missed_ticks(self) -> int:
+        """Ticks that were never done because an earlier one was too late."""
+        return self._schedule.missed
+
+    def run(self, stopped: Callable[[], bool]) -> None:
+        """Tick until ``stopped`` says so, which is asked once per tick."""
+        self._schedule = Schedule(self._rate, time.monotonic_ns())
+        while not stopped():
+            deadline = self._schedule.deadline_ns
+            ahead = deadline - time.monotonic_ns()
+            if ahead > 0:
+                # From Python 3.11 on this is clock_nanosleep to an absolute time of the monotonic clock.
+                time.sleep(ahead / NANOSECONDS)
+            began = time.monotonic_ns()
+            self.tick(began)
+            ended = time.monotonic_ns()
+            self._account((began - deadline) / NANOSECONDS, (ended - began) / NANOSECONDS)
+            self._schedule.advance(time.monotonic_ns())
+
+    def tick(self, now_ns: int) -> Estimate:
+        """Do one tick: take, decide, estimate, publish."""
+        meters = self._meters
+        meters.begin()
+        for inlet in self._inlets:
+            inlet.drain(self._estimator.ingest, time.monotonic_ns() + self._slice_ns)
+        meters.lap("ingest")
+        decision = self._governor.decide(self._estimator.demand)
+        meters.lap(_OTHER)
+        estimate = self._estimator.tick(now_ns, time.time_ns(), decision.afforded)
+        meters.lap("extraction")
+        self._send(ESTIMATE, estimate)
+        self._send_health(estimate)
+        self._send_at_leisure(estimate, now_ns)
+        meters.lap("publishing")
+        self._learn(estimate.particles)
+        self.ticks += 1
+        return estimate
+
+    def _send(self, tag: bytes, value: msgspec.Struct) -> None:
+        self._datagram[:1] = tag
+        self._encoder.encode_into(value, self._datagram, 1)
+        self._outlet.send(self._datagram)
+
+    def _send_health(self, estimate: Estimate) -> None:
+        """Say the state when it has changed, the position has jumped, or the publisher has started anew.
+
+        A reason alone does not count: it holds figures that change all the time.
+        """
+        last = self._health
+        if last is None or last.state != estimate.health:
+            since = estimate.time
+        elif last.reset_counter != estimate.reset_counter or self._heart.called():
+            since = last.since
+        else:
+            return
+        self._health = Health(estimate.time, estimate.health, estimate.reason, since, estimate.reset_counter)
+        self._send(HEALTH, self._health)
+
+    def _send_at_leisure(self, estimate: Estimate, now_ns: int) -> None:
+        """Send what goes out less often; each in a tick of its own where the rate leaves room."""
+        phase = self.ticks % self._second
+        if phase == self._second // 4:
+            self._send(BUDGET, self.budget(estimate))
+        elif phase == self._second // 2:
+            self._send(SENSORS, self.sensors(estimate.time, now_ns))
+        if self._cloud_count and self.ticks % self._cloud_every == self._cloud_every // 2:
+            self._send_cloud(estimate)
+        if self.ticks % self._beat_every == 0:
+            self._heart.beat()
+
+    def _send_cloud(self, estimate: Estimate) -> None:
+        if estimate.health == HealthState.WAITING:
+            return
+        rows = self._estimator.cloud(self._cloud_count)
+        description = self._encoder.encode(Cloud(len(rows), estimate.time))
+        self._outlet.send(cloud(description, np.ascontiguousarray(rows, "<f4").tobytes()))
+
+    def _learn(self, particles: int) -> None:
+        for stage, seconds in self._meters.costs.items():
+            if stage in _FIXED_STAGES or stage == _OTHER:
+                self._governor.observe(stage, seconds, 0)
+            elif particles and seconds > 0.0:
+                self._governor.observe(stage, seconds, particles)
+        self._meters.lap(_OTHER)
+
+    def _account(self, lateness: float, duration: float) -> None:
+        cost = self._meters.end(lateness, duration)
+        self.overruns += cost > self._budget_ms * 1e-3
+
+    def budget(self, estimate: Estimate) -> Budget:
+        """Return what the loop spent over the last second, and what it gave up since the start."""
+        stages = self._meters.stages()
+        return Budget(
+            time=estimate.time,
+            budget_ms=self._budget_ms,
+            rate=self._rate,
+            stages=stages,
+            use=stages["tick"].median / self._budget_ms,
+            demanded=estimate.demanded,
+            afforded=estimate.afforded,
+            particles=estimate.particles,
+            level=estimate.level,
+            ticks=self.ticks,
+            missed_ticks=self.missed_ticks,
+            overruns=self.overruns,
+            lateness=self._meters.recent_lateness(),
+            queues={inlet.name: inlet.waiting for inlet in self._inlets},
+            drops=self.drops(),
+        )
+
+    def drops(self) -> dict[str, int]:
+        """Return what was dropped since the start, by what."""
+        drops = {f"link {inlet.name}": inlet.dropped for inlet in self._inlets}
+        drops["publisher"] = self._outlet.dropped
+        drops["undecodable"] = sum(inlet.undecodable for inlet in self._inlets)
+        return drops | self._estimator.drops
+
+    def sensors(self, unix: float, now_ns: int) -> Sensors:
+        """Return every sensor and every link."""
+        return Sensors(
+            unix, self._estimator.sensors(now_ns), [inlet.status(now_ns) for inlet in self._inlets]
+        )
