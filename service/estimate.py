@@ -238,7 +238,8 @@ class Publishing(msgspec.Struct, frozen=True, gc=False):
     superseded : dict[str, int]
         Values never put because a newer one of the topic was there already: the process was behind.
     unsent : dict[str, int]
-        Values that had no session to go to, or whose put failed.
+        Values that had no session to go to, or whose put failed. Changes of ``health`` are made good as soon
+        as a session is open.
     malformed : dict[str, int]
         Datagrams that were none, by kind: ``unknown_tag``, ``broken_cloud``, ``large_cloud`` …
     put_ms : StageCost or None

@@ -24,7 +24,6 @@ TAGS = {
 }
 
 _LARGEST = 256 * 1024
-_AT_ONCE = 512
 _ROW_BYTES = 16
 _LENGTH = struct.Struct("<I")
 
@@ -57,9 +56,10 @@ class Inbox:
         Datagrams that were refused, by the kind of :class:`MalformedError`.
     """
 
-    def __init__(self, estimates: socket.socket) -> None:
+    def __init__(self, estimates: socket.socket, at_once: int = 512) -> None:
         estimates.setblocking(False)
         self._socket = estimates
+        self._at_once = at_once
         self._buffer = bytearray(_LARGEST)
         self.superseded: Counter[str] = Counter()
         self.malformed: Counter[str] = Counter()
@@ -67,11 +67,12 @@ class Inbox:
     def drain(self) -> list[Value]:
         """Return what waited, in order of arrival, but of every state only the newest.
 
-        At most 512 datagrams are taken in one go, so that a flood cannot keep the caller from its other work.
+        At most ``at_once`` datagrams are taken in one go, so that a flood cannot keep the caller from its
+        other work.
         """
         newest: dict[str, Value] = {}
         events: list[Value] = []
-        for _ in range(_AT_ONCE):
+        for _ in range(self._at_once):
             try:
                 length = self._socket.recv_into(self._buffer)
             except BlockingIOError:

@@ -19,6 +19,7 @@ from collections.abc import Callable
 
 import zenoh
 
+from service.backoff import BackOff
 from service.config import Configuration
 from service.publish.answers import Book, answers
 from service.publish.inbox import PROCESSES, Inbox, Value
@@ -31,7 +32,6 @@ log = logging.getLogger(__name__)
 _QUERY_WAIT_MS = 20
 _SLOW_PERIOD = 0.2
 _UPKEEP_PERIOD = 1.0
-_BACK_OFF = (0.5, 8.0)
 _CLOSING = 1.0
 
 
@@ -102,7 +102,8 @@ class Publisher:
         self._changes: deque[Value] = deque(maxlen=HISTORY)
         self._slow_at = 0.0
         self._upkeep_at = 0.0
-        self._back_off = _BACK_OFF[0]
+        self._back_off = BackOff()
+        self._opened_at = 0.0
         self._complaint = ""
         self._poll = select.poll()
         self._poll.register(estimates, select.POLLIN)
@@ -135,8 +136,9 @@ class Publisher:
         self._put(value)
         now = time.monotonic()
         if value.topic == ESTIMATE.key and now >= self._slow_at:
-            # Steps of the period, so that the mean rate holds; after a pause it starts anew.
-            self._slow_at = max(self._slow_at + _SLOW_PERIOD, now)
+            self._slow_at += _SLOW_PERIOD  # steps of the period: the mean rate holds at any rate of the loop
+            if self._slow_at <= now:
+                self._slow_at = now + _SLOW_PERIOD
             self._put(Value(SLOW.key, value.payload))
 
     def _put(self, value: Value) -> None:
@@ -170,7 +172,7 @@ class Publisher:
             close(opened.session, _CLOSING)
             self._retry_later(plain(error))
             return
-        self._back_off = _BACK_OFF[0]
+        self._opened_at = time.monotonic()
         self._complaint = ""
         self._book.session = opened.place
         self._book.opened += 1
@@ -179,16 +181,17 @@ class Publisher:
             self._put(change)
 
     def _retry_later(self, reason: str) -> None:
-        self._upkeep_at = time.monotonic() + self._back_off
+        now = time.monotonic()
+        self._upkeep_at = now + self._back_off.failed(now - self._opened_at)
         if reason != self._complaint:
-            log.error("no Zenoh session: %s; trying again, at most every %g s", reason, _BACK_OFF[1])
+            log.error("no Zenoh session: %s; trying again", reason)
             self._complaint = reason
-        self._back_off = min(2 * self._back_off, _BACK_OFF[1])
 
     def _lose(self, reason: str) -> None:
         log.warning("the Zenoh session is given up: %s", reason)
+        now = time.monotonic()
+        self._upkeep_at = now + self._back_off.failed(now - self._opened_at)
         self._book.session = "not open"
-        self._upkeep_at = 0.0
         outlet, self._outlet = self._outlet, None
         if outlet is not None:
             outlet.close(_CLOSING)
