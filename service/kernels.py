@@ -1,0 +1,136 @@
+"""Where the compiled kernels are kept, and how they come to be there.
+
+Compiling takes tens of seconds and must happen once: at installation, not at the first start of a vehicle.
+The cache lies in a folder whose name is a digest of what the machine code depends on (the kernels' sources,
+the compiler, the processor), so that a new version or a moved disk never meets code that is not its own.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+
+_KEPT = 3
+"""How many digests a cache keeps: the newest, and those of two other versions that may still be in use."""
+
+Progress = Callable[[str, int, int], None]
+"""Called with the name of a kernel, how many are done, and how many there are."""
+
+
+def _processor() -> str:
+    """Return what tells processors apart whose machine code differs."""
+    wanted = ("model name", "flags", "Features", "CPU part")
+    try:
+        lines = (
+            Path("/proc/cpuinfo")
+            .read_text(encoding="utf-8", errors="replace")
+            .split("\n\n", 1)[0]
+            .splitlines()
+        )
+    except OSError:
+        lines = []
+    return platform.machine() + "\n".join(line for line in lines if line.startswith(wanted))
+
+
+def _sources() -> list[Path]:
+    # found without importing it: once imported, its kernels have chosen their cache
+    found = find_spec("filters")
+    folder = Path(str(found.origin)).parent if found and found.origin else Path()
+    return sorted(folder.rglob("*.py"))
+
+
+def digest() -> str:
+    """Return 12 hexadecimal digits for the kernels' sources, the compiler and the processor."""
+    sources = _sources()
+    total = hashlib.sha256()
+    for path in sources:
+        total.update(path.relative_to(sources[0].parent).as_posix().encode() + b"\0" + path.read_bytes())
+    for fact in (
+        version("numba"),
+        version("llvmlite"),
+        version("numpy"),
+        platform.python_version(),
+        _processor(),
+    ):
+        total.update(fact.encode() + b"\0")
+    return total.hexdigest()[:12]
+
+
+def _places() -> Iterator[Path]:
+    """Return the folders that may hold the cache, best first."""
+    granted = os.environ.get("CACHE_DIRECTORY")  # systemd's CacheDirectory=, a list with colons
+    if granted:
+        yield Path(granted.split(":")[0])
+    shared = os.environ.get("XDG_CACHE_HOME")
+    if shared:
+        yield Path(shared) / "beliefd"
+    home = Path("~").expanduser()
+    if home.is_absolute():
+        yield home / ".cache" / "beliefd"
+    yield Path(tempfile.gettempdir()) / f"beliefd-{os.getuid()}"
+
+
+def _made(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK) and folder.stat().st_uid == os.getuid()
+
+
+def prepare() -> Path:
+    """Choose the folder of the compiled kernels and tell numba, before anything imports ``filters``.
+
+    Returns
+    -------
+    Path
+        The folder. Processes started from here inherit it. A ``NUMBA_CACHE_DIR`` that is set already stands.
+
+    Raises
+    ------
+    RuntimeError
+        numba is already imported, and would not see it.
+    OSError
+        No folder can be written to.
+    """
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    if "numba" in sys.modules:
+        raise RuntimeError("service.kernels.prepare() must run before numba is imported")
+    name = f"kernels-{digest()}"
+    for place in _places():
+        folder = place / name
+        if _made(folder):
+            os.environ["NUMBA_CACHE_DIR"] = str(folder)
+            return folder
+    raise OSError("no folder for the compiled kernels: set CACHE_DIRECTORY to one that can be written to")
+
+
+def _prune(folder: Path) -> None:
+    """Remove the caches of older versions beside ``folder``."""
+    if not folder.name.startswith("kernels-"):
+        return
+    caches = sorted(folder.parent.glob("kernels-*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    for stale in caches[_KEPT:]:
+        if stale != folder:
+            shutil.rmtree(stale, ignore_errors=True)
+
+
+def warm(progress: Progress) -> Path:
+    """Compile every kernel that is not in the cache yet; return the cache's folder."""
+    folder = prepare()
+    from filters.kernels import compile_all
+
+    compile_all(progress)
+    os.utime(folder)
+    _prune(folder)
+    return folder
