@@ -1,0 +1,177 @@
+"""Telemetry logs (.tlog): per frame a big-endian Unix time in microseconds and the MAVLink frame as it came.
+
+This is what MAVProxy, QGroundControl and Mission Planner write. A log may be damaged (a bad sector, a full
+disk), cut off in the middle of a frame, and its clock may have been set while it was recorded; all of that is
+survived and counted.
+"""
+
+from __future__ import annotations
+
+import mmap
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from drivers.mavlink.decode import Decoder
+from drivers.mavlink.dialect import LAYOUTS
+from drivers.mavlink.frames import MARKERS, Fault, Frame, frame_at
+from drivers.mavlink.settings import MavlinkSettings
+from drivers.sample import LinkReport, Sample
+
+STAMP = 8
+MICROSECOND = 1_000  # ns
+LONGEST_GAP = 60_000_000  # µs: further on, the next stamp decides whether this one is damaged
+
+
+class ReceiveClock:
+    """The log's receive clock, kept from running back.
+
+    A stamp out of line whose successor is in line again is damaged: the last one is used. A step back that
+    lasts (the clock was set) is taken out: time goes on from there.
+    """
+
+    def __init__(self) -> None:
+        self.faults: Counter[str] = Counter()
+        self._last: int | None = None
+        self._shift = 0
+
+    def read(self, stamp: int, following: int | None) -> int:
+        """Return the time of arrival in nanoseconds; ``following`` is the log's next stamp, if any."""
+        if self._last is None:
+            damaged = following is not None and not 0 <= following - stamp <= LONGEST_GAP
+            self._last = following if damaged and following is not None and following < stamp else stamp
+            return self._last * MICROSECOND
+        time = stamp + self._shift
+        if not 0 <= time - self._last <= LONGEST_GAP:
+            time = self._judge(time, following)
+        self._last = time
+        return time * MICROSECOND
+
+    def _judge(self, time: int, following: int | None) -> int:
+        last = self._last or 0
+        if following is not None and 0 <= following + self._shift - last <= LONGEST_GAP:
+            self.faults["bad_stamp"] += 1
+            return last
+        if time < last:
+            self.faults["clock_step"] += 1
+            self._shift += last - time
+            return last
+        return time
+
+
+class TlogReader:
+    """Reads a .tlog through the same decoder as the live link; see :class:`drivers.logs.LogReader`.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    link_name : str
+        What the samples name as their link.
+    settings : MavlinkSettings
+        As of the live link; ``url`` is not used.
+    """
+
+    def __init__(self, path: Path, link_name: str, settings: MavlinkSettings) -> None:
+        self._path = path
+        self._link = link_name
+        self._settings = settings
+        self._begin()
+
+    def _begin(self) -> None:
+        self._decoder = Decoder(self._link, self._settings)
+        self._clock = ReceiveClock()
+        self._faults: Counter[str] = Counter()
+        self._kinds: Counter[int] = Counter()
+        self._position = 0
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file."""
+        return self._path.stat().st_size
+
+    @property
+    def position(self) -> int:
+        """Bytes read so far."""
+        return self._position
+
+    def __iter__(self) -> Iterator[Sample]:
+        """Read from the start, in order of arrival.
+
+        Raises
+        ------
+        OSError
+            The file cannot be read.
+        """
+        self._begin()
+        if self.size == 0:  # an empty file cannot be mapped
+            return
+        with self._path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            yield from self._samples(data)
+
+    def _samples(self, data: mmap.mmap) -> Iterator[Sample]:
+        decoder, wanted, kinds = self._decoder, self._decoder.wanted, self._kinds
+        at = 0
+        while at < len(data):
+            frame = frame_at(data, at + STAMP)
+            if not isinstance(frame, Frame) or (frame.layout is None and not _followed(data, at, frame)):
+                at = self._position = self._resynchronise(data, at, frame)
+                continue
+            received = self._received(data, at, frame)
+            at = self._position = at + STAMP + len(frame.raw)
+            kinds[frame.identifier] += 1
+            if frame.identifier in wanted:
+                yield from decoder.decode(frame.message(), received)
+            elif frame.layout is None:
+                self._faults[Fault.UNKNOWN] += 1
+
+    def _received(self, data: mmap.mmap, at: int, frame: Frame) -> int:
+        stamp = int.from_bytes(data[at : at + STAMP], "big")
+        end = at + STAMP + len(frame.raw)
+        following = data[end : end + STAMP]
+        return self._clock.read(stamp, int.from_bytes(following, "big") if len(following) == STAMP else None)
+
+    def _resynchronise(self, data: mmap.mmap, at: int, fault: Frame | Fault) -> int:
+        """Return where the next good entry starts; count the stretch once, and its bytes."""
+        self._faults[fault if isinstance(fault, Fault) else Fault.UNKNOWN] += 1
+        search = at + STAMP + 1
+        while found := MARKERS.search(data, search):
+            frame = frame_at(data, found.start())
+            if isinstance(frame, Frame) and frame.layout is not None:
+                self._faults["lost_bytes"] += found.start() - STAMP - at
+                return found.start() - STAMP
+            search = found.start() + 1
+        self._faults["lost_bytes"] += len(data) - at
+        return len(data)
+
+    def report(self) -> LinkReport:
+        """Return the totals of the iteration so far."""
+        decoder = self._decoder
+        clocks = decoder.main_clocks
+        wanted = sum(count for identifier, count in self._kinds.items() if identifier in decoder.wanted)
+        unwanted = self._kinds.total() - wanted - self._faults[Fault.UNKNOWN]
+        return LinkReport(
+            self._link,
+            "up",
+            messages=decoder.messages,
+            samples=decoder.samples,
+            malformed=dict(self._faults + self._clock.faults + decoder.malformed),
+            ignored=unwanted + decoder.ignored.total(),
+            opened=1,
+            clock=clocks.boot.method if clocks else "",
+            offset=clocks.boot.offset if clocks else None,
+            jitter=clocks.boot.jitter if clocks else None,
+        )
+
+    def kinds(self) -> dict[str, int]:
+        """Return how many messages of each kind were met, wanted or not; unknown ones by id."""
+        return {
+            LAYOUTS[identifier].name if identifier in LAYOUTS else str(identifier): count
+            for identifier, count in self._kinds.items()
+        }
+
+
+def _followed(data: mmap.mmap, at: int, frame: Frame) -> bool:
+    """Whether an unknown message is believed: the log ends after it, or an entry follows."""
+    marker = at + STAMP + len(frame.raw) + STAMP
+    return marker - STAMP == len(data) or data[marker : marker + 1] in (b"\xfd", b"\xfe")

@@ -1,0 +1,48 @@
+"""Air data: SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, and what may be taken from VFR_HUD."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from drivers.mavlink.inertial import HECTOPASCAL, KELVIN
+from drivers.mavlink.moment import Moment, Timed
+from drivers.sample import Altitude, Heading, Pressure, Speed
+
+CENTIKELVIN = 0.01
+
+
+def scaled_pressure(fields: Any, at: Moment) -> list[Timed]:
+    """SCALED_PRESSURE 29, 137, 143: hPa, hundredths of a degree Celsius; differential 0: no such sensor."""
+    differential = fields.press_diff * HECTOPASCAL if fields.press_diff != 0.0 else None
+    if differential is not None and not math.isfinite(differential):
+        at.refuse("press_diff")
+        differential = None
+    temperature = fields.temperature * CENTIKELVIN + KELVIN
+    reading = Pressure(fields.press_abs * HECTOPASCAL, differential, temperature)
+    return [(at.boot_ms(fields.time_boot_ms), reading)]
+
+
+class Hud:
+    """VFR_HUD 74, as far as the settings ask for it. It has no stamp.
+
+    It repeats GNSS and the autopilot's filter; its airspeed, which may be made up, is not offered at all.
+    """
+
+    def __init__(self, wanted: frozenset[str]) -> None:
+        self._wanted = wanted
+
+    def __call__(self, fields: Any, at: Moment) -> list[Timed]:
+        """Return speed over ground, altitude, heading: those asked for."""
+        readings: list[Timed] = []
+        if "groundspeed" in self._wanted:
+            readings.append((at.received, Speed(fields.groundspeed)))
+        if "altitude" in self._wanted:
+            readings.append((at.received, Altitude(fields.alt)))
+        if "heading" in self._wanted:
+            if 0 <= fields.heading <= 360:
+                heading = math.remainder(math.radians(fields.heading), math.tau)
+                readings.append((at.received, Heading(heading)))
+            else:
+                at.refuse("heading")
+        return readings
