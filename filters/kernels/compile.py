@@ -1,0 +1,148 @@
+"""The one typed doorway to numba.
+
+A *kernel* is a small function over columns with one explicit signature: it is compiled when its module is
+imported, or loaded from numba's cache. A *function* is scalar arithmetic that a kernel calls and LLVM
+inlines. Neither reads anything but its arguments, so both run as plain Python too (``NUMBA_DISABLE_JIT=1``),
+slowly.
+
+Two sets of floating-point flags, because the compiler may reorder one and not the other:
+
+- functions are polynomials and range reductions whose order of operations matters; only contraction to fused
+  multiply-add and indifference to the sign of zero are allowed;
+- kernels sum over particles; there reassociation is what lets the sum run in vector registers.
+
+Neither claims the absence of infinities and NaN: a particle far away may have the log weight minus infinity.
+Division never raises (``error_model="numpy"``), or loops would not vectorise.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import Any, Protocol, TypeVar, cast
+
+import numba
+import numpy as np
+from numba.core import config
+from numpy.typing import NDArray
+
+Float32Array = NDArray[np.float32]
+Int32Array = NDArray[np.int32]
+Progress = Callable[[str, int, int], None]
+F = TypeVar("F", bound=Callable[..., Any])
+
+FUNCTION_FLAGS = frozenset({"nsz", "contract"})
+KERNEL_FLAGS = frozenset({"nsz", "contract", "arcp", "reassoc"})
+INTERPRETED = bool(cast(Any, config).DISABLE_JIT)
+
+
+class Dispatcher(Protocol):
+    """What of numba's dispatcher is used here."""
+
+    py_func: Callable[..., Any]
+
+    def compile(self, sig: str) -> object:
+        """Compile one signature, or load it from the cache."""
+        ...
+
+    def disable_compile(self) -> None:
+        """Refuse other signatures; convert arguments to the one there is."""
+        ...
+
+
+class Pending:
+    """A kernel that is known and, perhaps, not yet compiled."""
+
+    def __init__(self, name: str, signature: str, dispatcher: Dispatcher) -> None:
+        self.name = name
+        self.signature = signature
+        self._dispatcher = dispatcher
+        self._compiled = False
+
+    def compile(self) -> None:
+        """Compile it, or load it from the cache, once."""
+        if not self._compiled:
+            self._dispatcher.compile(self.signature)
+            self._dispatcher.disable_compile()
+            self._compiled = True
+
+
+_kernels: dict[str, Pending] = {}
+_deferring = False
+
+
+def kernel(signature: str, *, exact: bool = False) -> Callable[[F], F]:
+    """Make a kernel of a function over columns.
+
+    Parameters
+    ----------
+    signature : str
+        numba's notation, for example ``"void(float32[::1], int64, int64)"``. Other arguments are converted to
+        it.
+    exact : bool
+        Keep the order of floating-point operations as written: for sums that must come out the same as an
+        oracle's.
+    """
+    flags = FUNCTION_FLAGS if exact else KERNEL_FLAGS
+    compiler = cast(Callable[..., Callable[[F], Any]], numba.njit)(
+        fastmath=set(flags), nogil=True, cache=True, error_model="numpy"
+    )
+
+    def decorate(python: F) -> F:
+        compiled = compiler(python)
+        if not INTERPRETED:
+            name = f"{python.__module__}.{python.__name__}"
+            _kernels[name] = Pending(name, signature, cast(Dispatcher, compiled))
+            if not _deferring:
+                _kernels[name].compile()
+        return cast(F, compiled)
+
+    return decorate
+
+
+def function(python: F) -> F:
+    """Make scalar arithmetic that kernels call; LLVM inlines it into each."""
+    compiler = cast(Callable[..., Callable[[F], Any]], numba.njit)(
+        fastmath=set(FUNCTION_FLAGS), error_model="numpy", forceinline=True
+    )
+    return cast(F, compiler(python))
+
+
+@contextmanager
+def _deferred() -> Generator[None]:
+    global _deferring  # noqa: PLW0603  the decorator runs at import, where no argument can reach it
+    before, _deferring = _deferring, True
+    try:
+        yield
+    finally:
+        _deferring = before
+
+
+def compile_all(progress: Progress | None = None) -> int:
+    """Compile every kernel of ``filters``, or load it from the cache; what an installation step calls.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        Told ``(name, index, total)`` before each kernel, with ``index`` from 0, and once more with
+        ``index == total`` and an empty name when all are there.
+
+    Returns
+    -------
+    int
+        How many kernels there are.
+    """
+    package = importlib.import_module("filters")
+    with _deferred():
+        for module in pkgutil.walk_packages(package.__path__, "filters."):
+            importlib.import_module(module.name)
+    total = len(_kernels)
+    for index, pending in enumerate(_kernels.values()):
+        if progress is not None:
+            progress(pending.name, index, total)
+        pending.compile()
+    if progress is not None:
+        progress("", total, total)
+    return total

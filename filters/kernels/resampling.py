@@ -1,0 +1,69 @@
+"""Systematic resampling: where the copies come from, and where they are laid."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filters.kernels.compile import Float32Array, Int32Array, kernel
+
+
+@kernel("float64(float32[::1])")
+def total(weights: Float32Array) -> float:
+    """Sum of the weights in float64."""
+    s = np.float64(0.0)
+    for i in range(weights.size):
+        s += np.float64(weights[i])
+    return s
+
+
+@kernel("void(float32[::1], float64, float64, int32[::1])", exact=True)
+def systematic(weights: Float32Array, total: float, uniform: float, ancestors: Int32Array) -> None:
+    """Table 4.4, with the loops the other way round: each source marks where its first copy goes.
+
+    Source i takes the positions m with c(i-1) < (uniform + m) / count <= c(i), c being the cumulative weight;
+    so the first position after it is floor(c · count - uniform) + 1. A running maximum then fills the gaps.
+    What rounding leaves between the last cumulative weight and the total goes to the last source that has
+    weight.
+    """
+    count = ancestors.size
+    for m in range(count):
+        ancestors[m] = 0
+    scale = count / total
+    cumulative = 0.0
+    end = 0
+    for i in range(weights.size):
+        if end < count:  # a source without a copy is overwritten by the next
+            ancestors[end] = i
+        cumulative += weights[i]
+        end = min(count, int(cumulative * scale + 1.0 - uniform))
+    if end < count:
+        i = weights.size - 1
+        while weights[i] <= 0.0:
+            i -= 1
+        ancestors[end] = i
+    latest = np.int32(0)
+    for m in range(count):
+        latest = max(latest, ancestors[m])
+        ancestors[m] = latest
+
+
+@kernel("void(float32[::1], float32[::1], int32[::1], int64[::1])", exact=True)
+def deal(
+    source: Float32Array, target: Float32Array, ancestors: Int32Array, starts: NDArray[np.int64]
+) -> None:
+    """Deal a column's copies to the blocks in turn, like cards, so that each block gets a fair sample.
+
+    ``ancestors`` ascend; laid down in a row, the first block would hold only the first ancestors' copies.
+    """
+    blocks = starts.size
+    count = ancestors.size
+    rounds = count // blocks
+    m = 0
+    for position in range(rounds):
+        for block in range(blocks):
+            target[starts[block] + position] = source[ancestors[m]]
+            m += 1
+    for block in range(count - m):
+        target[starts[block] + rounds] = source[ancestors[m]]
+        m += 1

@@ -1,0 +1,7 @@
+"""Motion models: how a belief moves (line 4 of Table 4.3)."""
+
+from filters.motion.model import Motion
+from filters.motion.slow import RandomWalk
+from filters.motion.unicycle import Unicycle, UnicycleControl
+
+__all__ = ["Motion", "RandomWalk", "Unicycle", "UnicycleControl"]
