@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from drivers.can import CanFrame, CanSettings, Decoder
-from drivers.sample import Sample
+from drivers.can.traffic import Traffic
+from drivers.sample import LinkReport, Sample
 
 _LINE = re.compile(
     rb"\((?P<seconds>\d{1,11})\.(?P<fraction>\d{1,9})\)\s+(?P<channel>\S{1,64})\s+"
@@ -82,65 +83,75 @@ class CandumpReader:
     settings : CanSettings
         Of the link; the interface and channel play no part.
 
-    Attributes
-    ----------
-    size : int
-        Bytes of the file, as it lies on the disk.
-    frames : int
-        Data frames read.
-
     Raises
     ------
     OSError
-        The file cannot be read.
+        The file does not exist.
     """
 
     def __init__(self, path: Path, link_name: str, settings: CanSettings) -> None:
         self._path = path
         self._link = link_name
         self._settings = settings
-        self._decoders: dict[str, Decoder] = {}
-        self._refused: Counter[str] = Counter()
+        self._size = path.stat().st_size
         self._file: BinaryIO | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        self._decoders: dict[str, Decoder] = {}
+        self._traffic = Traffic()
+        self._refused: Counter[str] = Counter()
+        self._samples = 0
         self._skipped = 0
-        self.size = path.stat().st_size
-        self.frames = 0
+        self._latest_ns = 0
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file, as it lies on the disk."""
+        return self._size
 
     @property
     def position(self) -> int:
         """Bytes of the file read so far: ``position / size`` is the progress."""
         if self._file is None:
             return 0
-        return self.size if self._file.closed else self._file.tell()
+        return self._size if self._file.closed else self._file.tell()
 
-    @property
-    def messages(self) -> int:
-        """Messages understood."""
-        return sum(decoder.messages for decoder in self._decoders.values())
+    def report(self) -> LinkReport:
+        """Return the totals of the iteration so far."""
+        decoders = self._decoders.values()
+        return LinkReport(
+            link=self._link,
+            state="up",
+            messages=sum(decoder.messages for decoder in decoders),
+            samples=self._samples,
+            malformed=dict(sum((decoder.malformed for decoder in decoders), self._refused.copy())),
+            ignored=self._skipped + sum(decoder.ignored for decoder in decoders),
+            opened=1,
+        )
 
-    @property
-    def malformed(self) -> Counter[str]:
-        """What was refused, by kind: ``bad_line``, ``truncated_file``, and the decoder's."""
-        return sum((decoder.malformed for decoder in self._decoders.values()), self._refused.copy())
-
-    @property
-    def ignored(self) -> int:
-        """Frames that are well-formed but not wanted."""
-        return self._skipped + sum(decoder.ignored for decoder in self._decoders.values())
+    def kinds(self) -> dict[str, int]:
+        """Return how many messages of each kind were met, also of those that no one wants."""
+        return self._traffic.kinds()
 
     def __iter__(self) -> Iterator[Sample]:
         """Yield the samples in the order of the recording; a damaged line is counted and ends nothing."""
-        for time_ns, channel, frame in self.read_frames():
+        self._begin()
+        for time_ns, channel, frame in self._frames():
             decoder = self._decoders.get(channel)
             if decoder is None:
                 if len(self._decoders) == _MOST_CHANNELS:
                     self._refused["too_many_channels"] += 1
                     continue
                 decoder = self._decoders[channel] = Decoder(self._link, self._settings)
-            yield from decoder.decode(frame, time_ns)
+            self._traffic.count(frame)
+            # The stamps of several buses may cross by microseconds; the receive clock never goes back.
+            self._latest_ns = max(self._latest_ns, time_ns)
+            for sample in decoder.decode(frame, self._latest_ns):
+                self._samples += 1
+                yield sample
 
-    def read_frames(self) -> Iterator[LoggedFrame]:
-        """Yield the data frames, undecoded, for those who know another protocol."""
+    def _frames(self) -> Iterator[LoggedFrame]:
         for line in self._lines():
             if not line.strip():
                 continue
@@ -152,7 +163,6 @@ class CandumpReader:
             if logged is None:
                 self._skipped += 1
                 continue
-            self.frames += 1
             yield logged
 
     def _lines(self) -> Iterator[bytes]:
