@@ -1,6 +1,7 @@
 """The autopilot's own idea of its heading: the gyro integrated, drawn toward the compass where there is one.
 
-A complementary filter with an integral part that learns the gyro's bias (Mahony, Hamel, Pflimlin, 2008, in one angle).
+A complementary filter with an integral part that learns the gyro's bias (Mahony, Hamel, Pflimlin, 2008, in
+one angle).
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class AttitudeFilter:
         self._time = time
 
     def align(self, time: float, heading: float) -> None:
-        """Take a compass heading in radians measured at ``time`` in seconds; the first one is believed at once."""
+        """Take a compass heading in radians, measured at ``time`` in seconds; the first is believed."""
         if self._compass_time is None:
             self.yaw = heading
         else:

@@ -1,8 +1,8 @@
-"""The autopilot's MAVLink face: streams its telemetry, answers what companions ask, as ArduPilot's rover does.
+"""The autopilot's MAVLink face: streams its telemetry, answers companions, as ArduPilot's rover does.
 
-Until anybody asks, every message streams at a default rate. SET_MESSAGE_INTERVAL changes one message's rate and is
-refused for WHEEL_DISTANCE, which obeys REQUEST_DATA_STREAM instead, as on the real one. Frames are MAVLink 2, unsigned,
-from system 1, component 1; stamps count from the autopilot's own boot.
+Until anybody asks, every message streams at a default rate. SET_MESSAGE_INTERVAL changes one message's rate
+and is refused for WHEEL_DISTANCE, which obeys REQUEST_DATA_STREAM instead, as on the real one. Frames are
+MAVLink 2, unsigned, from system 1, component 1; stamps count from the autopilot's own boot.
 """
 
 from __future__ import annotations
@@ -117,7 +117,6 @@ class Autopilot:
         self._codec.robust_parsing = True
         self._new: set[int] = set()
         self.refused: Counter[str] = Counter()
-        self.rebooted_at = 0.0
 
     @property
     def next_due(self) -> float:
@@ -140,7 +139,11 @@ class Autopilot:
         self._known.truth = truth
 
     def take_wheels(self, reading: WheelReading, _now: float) -> None:
-        """Take a reading of the encoders."""
+        """Take a reading of the encoders, and make a speed of it and the one before."""
+        before = self._known.wheels
+        if before is not None and reading.time > before.time:
+            rolled = 0.5 * (reading.left - before.left + reading.right - before.right)
+            self._known.speed = rolled / (reading.time - before.time)
         self._known.wheels = reading
         self._new.add(mavlink.MAVLINK_MSG_ID_WHEEL_DISTANCE)
 
@@ -177,9 +180,16 @@ class Autopilot:
             if kind == "BAD_DATA":
                 self.refused["malformed"] += 1
                 continue
-            answer = _ANSWERS.get(kind)
-            if answer is not None and _is_for_us(message):
-                answer(self, message, now)
+            if _is_for_us(message):
+                self._answer(kind, message, now)
+
+    def _answer(self, kind: str, message: Any, now: float) -> None:
+        if kind == "TIMESYNC":
+            self._answer_timesync(message, now)
+        elif kind == "COMMAND_LONG":
+            self._answer_command(message, now)
+        elif kind == "REQUEST_DATA_STREAM":
+            self._answer_data_stream(message, now)
 
     def _say(self, message: Message | None, now: float) -> None:
         if message is None:
@@ -252,9 +262,3 @@ _SENSOR_OF = frozenset(
     )
 )
 """Messages that are skipped when their sensor has said nothing new since the last one."""
-
-_ANSWERS: dict[str, Callable[[Autopilot, Any, float], None]] = {
-    "TIMESYNC": Autopilot._answer_timesync,
-    "COMMAND_LONG": Autopilot._answer_command,
-    "REQUEST_DATA_STREAM": Autopilot._answer_data_stream,
-}

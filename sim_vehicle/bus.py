@@ -1,14 +1,14 @@
-"""What is on the rover's CAN bus: DroneCAN nodes for the receiver, the inertial unit, the motors and a range finder.
+"""What is on the rover's CAN bus: DroneCAN nodes for receiver, inertial unit, motors and a range finder.
 
-Each node broadcasts what its sensor last read, and a NodeStatus once a second. The nodes' clocks are not synchronised:
-a timestamp counts from the node's own boot. GNSS time is UTC.
+Each node broadcasts what its sensor last read, and a NodeStatus once a second. The nodes' clocks are not
+synchronised: a timestamp counts from the node's own boot. GNSS time is UTC.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from sim_vehicle.clock import BoardClock
@@ -34,7 +34,7 @@ _ESC_FULL_SCALE = 8191
 _SPEED_COMMAND = 2
 """actuator.Command.command_type: speed, here of a wheel's rim, m/s."""
 _LIDAR, _READING_VALID, _DOWNWARD = 2, 0, (0, -8, 0)
-"""range_sensor.Measurement: sensor and reading type; beam orientation in quarters of pi/4 … (pitched down by 90°)."""
+"""range_sensor.Measurement: sensor and reading type; roll, pitch, yaw of the beam in steps of 12 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class BusSettings:
     """
 
     wire: WireSettings
-    clock: BoardClock = BoardClock()
+    clock: BoardClock = field(default_factory=BoardClock)
     gnss: GnssSettings | None = None
     inertial: InertialSettings | None = None
     compass: CompassSettings | None = None
@@ -121,7 +121,7 @@ class Bus:
         self._broadcast(now, self._sensors, fix)
 
     def take_inertial(self, reading: InertialReading, now: float) -> None:
-        """Broadcast ahrs.RawIMU: the latest rates and specific forces; the integrals are those of one interval."""
+        """Broadcast ahrs.RawIMU: latest rates and specific forces, and the integrals of one interval."""
         interval = 1.0 / self._settings.inertial.cadence.rate if self._settings.inertial else 0.0
         value = message(
             "uavcan.equipment.ahrs.RawIMU",
@@ -169,7 +169,7 @@ class Bus:
         self._broadcast(now, self._sensors, value)
 
     def motors(self, now: float, truth: Truth, wheel_speeds: tuple[float, float], track: float) -> None:
-        """Broadcast the motors' revolutions (esc.Status) and the commands to them (RawCommand, ArrayCommand)."""
+        """Broadcast the motors' revolutions (esc.Status) and their commands (RawCommand, ArrayCommand)."""
         per_second = 1.0 / (math.tau * self._settings.wheel_radius)
         for index, (node, speed) in enumerate(zip((self._left, self._right), wheel_speeds, strict=True)):
             value = message(

@@ -1,7 +1,7 @@
 """Random numbers, one independent stream for each part of the vehicle.
 
-A stream is keyed by the seed and by the part's name alone, so a sensor that is switched off, or a new one, leaves the
-noise of all the others as it was (Philox, a counter-based generator; Salmon et al., 2011).
+A stream is keyed by the seed and by the part's name alone, so a sensor that is switched off, or a new one,
+leaves the noise of all the others as it was (Philox, a counter-based generator; Salmon et al., 2011).
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ application = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 @application.command(
     epilog="Examples: python -m sim_vehicle beacons --seed 1 --write out/b1  ·  "
-    "python -m sim_vehicle demo --mavlink udpout:127.0.0.1:14550 --can slcan:/tmp/can0 --realtime --truth truth.csv"
+    "python -m sim_vehicle demo --realtime --mavlink udpout:127.0.0.1:14550 --can slcan:/tmp/can0"
 )
 def drive(
     scenario: Annotated[
@@ -41,7 +41,7 @@ def drive(
     can: Annotated[
         str,
         typer.Option(
-            help="INTERFACE:CHANNEL of python-can, as socketcan:vcan0; slcan:PATH makes a serial adapter there.",
+            help="INTERFACE:CHANNEL of python-can (socketcan:vcan0); slcan:PATH makes an adapter there.",
             show_default=False,
         ),
     ] = "",
@@ -51,7 +51,7 @@ def drive(
     write: Annotated[
         Path | None,
         typer.Option(
-            help="Drive faster than real time and write STEM.tlog, STEM.candump.log, STEM_truth.csv, STEM.toml.",
+            help="Write STEM.tlog, STEM.candump.log, STEM_truth.csv, STEM.toml, faster than real time.",
             metavar="STEM",
             show_default=False,
         ),
@@ -101,7 +101,8 @@ def _write(scenario: Scenario, seed: int, seconds: float, stem: Path) -> None:
     for path in recorded.files:
         typer.echo(path)
     typer.echo(
-        f"{recorded.mavlink_frames} MAVLink frames, {recorded.can_frames} CAN frames, {recorded.truth_rows} truth rows"
+        f"{recorded.mavlink_frames} MAVLink frames, {recorded.can_frames} CAN frames, "
+        f"{recorded.truth_rows} truth rows"
     )
 
 
@@ -133,7 +134,8 @@ def _drive(
             seconds, lambda: bool(stopping)
         )
     typer.echo(
-        f"{driven.seconds:.1f} s: {driven.mavlink_frames} MAVLink frames ({driven.mavlink_dropped} to nobody), "
+        f"{driven.seconds:.1f} s: "
+        f"{driven.mavlink_frames} MAVLink frames ({driven.mavlink_dropped} to nobody), "
         f"{driven.can_frames} CAN frames ({driven.can_dropped} to nobody)"
     )
 

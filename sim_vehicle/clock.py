@@ -32,5 +32,5 @@ class BoardClock:
         return self.nanoseconds(time) // 1000
 
     def milliseconds(self, time: float) -> int:
-        """Return milliseconds since boot at ``time``, as the wire carries them: 32 bits, which wrap in 49.7 days."""
+        """Return milliseconds since boot at ``time``, in the 32 bits of the wire (a wrap in 49.7 days)."""
         return (self.nanoseconds(time) // 1_000_000) & 0xFFFF_FFFF

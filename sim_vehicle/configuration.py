@@ -1,7 +1,7 @@
-"""The configuration that goes with a drive: one TOML file for the daemon, with only what an operator could know.
+"""The configuration that goes with a drive: a TOML file with only what an operator could know.
 
-The operator knows the site, the beacons and the sensors' data sheets; the start he knows roughly. What the seed drew
-(biases, scales, clocks) is not in it.
+The operator knows the site, the beacons and the sensors' data sheets; the start he knows roughly. What the
+seed drew (biases, scales, clocks) is not in it.
 """
 
 from __future__ import annotations

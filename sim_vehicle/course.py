@@ -1,7 +1,7 @@
 """Where the rover drives: waypoints with a speed and a pause each, and the driver who follows them.
 
-The driver steers by pure pursuit (Coulter, 1992): toward a point on the course some metres ahead, with the curvature
-2 sin(angle) / distance. He sees the truth, as a person at the wheel does.
+The driver steers by pure pursuit (Coulter, 1992): toward a point on the course some metres ahead, with the
+curvature 2 sin(angle) / distance. He sees the truth, as a person at the wheel does.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sim_vehicle.rover import Command
 
 @dataclass(frozen=True, slots=True)
 class Waypoint:
-    """A point to drive to, metres; the speed on the way there, m/s; how long to stand still there, seconds."""
+    """A point to drive to, metres; the speed on the way, m/s; how long to stand still there, seconds."""
 
     north: float
     east: float
@@ -138,7 +138,7 @@ class CourseDriver:
         return remaining
 
     def _aim(self, remaining: float) -> tuple[float, float]:
-        """Return the point on the course at the look-ahead distance, going round the corner where nobody stops."""
+        """Return the point of the course at the look-ahead distance, round the corner where nobody stops."""
         index, ahead = self._next, self._course.look_ahead - remaining
         target = self._course.waypoints[index]
         if ahead > 0.0 and target.pause == 0.0:
@@ -146,7 +146,7 @@ class CourseDriver:
             start, north, east, length = self._leg(index)
             along = min(ahead, length)
         else:
-            # Beyond a stop the line goes on straight, so that the last metres are not driven toward a point too near.
+            # Beyond a stop the line goes on straight: a point too near would make the last metres swerve.
             start, north, east, length = self._leg(index)
             along = length - remaining + self._course.look_ahead
         return start.north + along * north, start.east + along * east

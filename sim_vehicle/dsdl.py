@@ -26,7 +26,7 @@ class CanFrame:
 
 
 def message(name: str, **values: Any) -> Any:
-    """Return a DroneCAN message by its full name (``uavcan.equipment.gnss.Fix2``), its plain fields filled in.
+    """Return a DroneCAN message by its name (``uavcan.equipment.gnss.Fix2``), its plain fields filled in.
 
     Raises
     ------
@@ -58,7 +58,7 @@ class Node:
         self._transfers: defaultdict[str, int] = defaultdict(int)
 
     def frames(self, value: Any) -> list[CanFrame]:
-        """Return the frames of one broadcast transfer: tail bytes, and a CRC in front when there are several."""
+        """Return the frames of one broadcast transfer: tail bytes, and a CRC before several."""
         kind = str(cast(Any, dronecan).get_dronecan_data_type(value))
         transfer = cast(Any, transport).Transfer(
             transfer_id=self._transfers[kind],

@@ -1,7 +1,7 @@
 """What goes wrong, and when: windows of time in which a link or a sensor drops, corrupts, repeats or delays.
 
-A fault is data; :class:`Faults` applies those of one target, with random numbers of its own, so that the noise of
-everything else stays as it was. What it did is counted.
+A fault is data; :class:`Faults` applies those of one target, with random numbers of its own, so that the
+noise of everything else stays as it was. What it did is counted.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class Fault:
     Attributes
     ----------
     target : str
-        The link (``mavlink``, ``can``: frames) or the sensor (``wheels``, ``beacons``, …: readings, which can be
-        dropped and delayed).
+        The link (``mavlink``, ``can``: frames) or the sensor (``wheels``, ``beacons``, …: readings, which can
+        be dropped and delayed).
     kind : Kind
         What happens.
     window : Window

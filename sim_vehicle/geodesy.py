@@ -1,4 +1,4 @@
-"""Where the site is on the Earth: metres north, east and down of an origin to latitude, longitude and altitude."""
+"""Where the site is on the Earth: metres north, east, down to latitude, longitude, altitude."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import pymap3d
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """The point from which positions count; ``latitude`` and ``longitude`` in degrees, WGS 84, ``altitude`` in metres.
+    """The point from which positions count; latitude and longitude in WGS 84 degrees, altitude in metres.
 
-    The site lies where the geoid and the ellipsoid agree: altitude above sea level and height above the ellipsoid are
-    one number.
+    The site lies where the geoid and the ellipsoid agree: altitude above sea level and height above the
+    ellipsoid are one number.
     """
 
     latitude: float

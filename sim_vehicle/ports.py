@@ -279,7 +279,8 @@ def open_can(where: str) -> CanPort:
     Parameters
     ----------
     where : str
-        ``INTERFACE:CHANNEL``; with ``slcan:PATH`` the simulator is the serial adapter, and PATH leads to its port.
+        ``INTERFACE:CHANNEL``; with ``slcan:PATH`` the simulator is the serial adapter, and PATH leads to its
+        port.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Driving against the host's clock: frames leave when they are due, and what companions say is answered.
 
-A drive begins when it is started; its time is the host's monotonic clock since then, and the truth is written with the
-host's Unix clock as it was at the start.
+A drive begins when it is started; its time is the host's monotonic clock since then, and the truth is written
+with the host's Unix clock as it was at the start.
 """
 
 from __future__ import annotations

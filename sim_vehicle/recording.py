@@ -1,8 +1,9 @@
-"""Writing a drive as log files, faster than real time: what a listener on both links would have recorded, and the truth.
+"""A drive written as logs, faster than real time: what listeners would have recorded, and the truth.
 
-``STEM.tlog``: for each MAVLink frame eight bytes of big-endian Unix microseconds of its arrival, then the frame.
-``STEM.candump.log``: one line per CAN frame, as ``candump -L`` writes them. ``STEM_truth.csv``: the pose 50 times a
-second on the same clock. ``STEM.toml``: the configuration. The same seed gives the same bytes.
+``STEM.tlog``: for each MAVLink frame eight bytes of big-endian Unix microseconds of its arrival, then the
+frame. ``STEM.candump.log``: one line per CAN frame, as ``candump -L`` writes them. ``STEM_truth.csv``: the
+pose 50 times a second on the same clock. ``STEM.toml``: the configuration. The same seed gives the same
+bytes.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ class Recorded:
 
 def truth_row(truth: Truth, unix: float) -> str:
     """Return one line of the truth: Unix seconds, metres, heading in (-pi, pi]."""
-    return f"{unix + truth.time:.6f},{truth.north:.6f},{truth.east:.6f},{truth.down:.6f},{truth.wrapped_heading:.8f}\n"
+    position = f"{truth.north:.6f},{truth.east:.6f},{truth.down:.6f}"
+    return f"{unix + truth.time:.6f},{position},{truth.wrapped_heading:.8f}\n"
 
 
 def candump_line(unix_us: int, frame: CanFrame) -> str:

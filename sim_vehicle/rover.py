@@ -1,7 +1,8 @@
-"""How a rover answers its commands: skid steering and Ackermann steering, with the limits that real ones have.
+"""How a rover answers its commands: skid and Ackermann steering, with the limits that real ones have.
 
-Speed is that of the body's origin (the middle between the driven wheels) along the body's forward axis; yaw rate is
-about down, positive clockwise seen from above. Wheels do not slip here: slip is an error of the encoder that sees it.
+Speed is that of the body's origin (the middle between the driven wheels) along the body's forward axis; yaw
+rate is about down, positive clockwise seen from above. Wheels do not slip here: slip is an error of the
+encoder that sees it.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ class AckermannRover:
     acceleration: float = 0.8
 
     def respond(self, motion: Motion, command: Command, duration: float) -> Motion:
-        """Return the motion after ``duration`` seconds: speed and steering angle follow within their limits."""
+        """Return the motion after ``duration`` seconds: speed and steering follow within their limits."""
         speed = _toward(motion.speed, command.speed, self.acceleration * duration)
         steering = motion.steering
         if abs(command.speed) > 1e-3:

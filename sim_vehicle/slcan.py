@@ -1,8 +1,9 @@
 """A serial CAN adapter made of a pseudo-terminal: this side is the adapter, the client opens the other side.
 
-The text protocol is LAWICEL's: ``S8`` sets the rate, ``O`` opens, ``L`` opens to listen, ``C`` closes, ``V`` and ``N``
-ask for version and serial number; ``T1234567833AABBCC`` is an extended frame, ``t`` a standard one, each ending in a
-carriage return. The client may come and go; frames for which there is nobody, or no room, are dropped and counted.
+The text protocol is LAWICEL's: ``S8`` sets the rate, ``O`` opens, ``L`` opens to listen, ``C`` closes, ``V``
+and ``N`` ask for version and serial number; ``T1234567833AABBCC`` is an extended frame, ``t`` a standard one,
+each ending in a carriage return. The client may come and go; frames for which there is nobody, or no room,
+are dropped and counted.
 """
 
 from __future__ import annotations
@@ -135,7 +136,7 @@ class Adapter:
             self._say(b"Z\r" if frame.extended else b"z\r")
 
     def _say(self, line: bytes) -> bool:
-        """Write a whole line; what does not fit at once goes before the next one, so that no line is ever cut."""
+        """Write a whole line; what does not fit goes before the next one, so that no line is cut."""
         try:
             if self._backlog:
                 self._backlog = self._backlog[os.write(self._ours, self._backlog) :]

@@ -1,7 +1,7 @@
-"""What the autopilot knows, and how it says so: every MAVLink message that it sends, with its scaling and sentinels.
+"""What the autopilot knows, and how it says so: every message, with its scaling and sentinels.
 
-The numbers of the wire are those of the MAVLink definitions (dialect ``all``); each function returns ``None`` when there
-is nothing to say yet, or nothing new.
+The numbers of the wire are those of the MAVLink definitions (dialect ``all``); each function returns ``None``
+when there is nothing to say yet, or nothing new.
 """
 
 from __future__ import annotations
@@ -62,6 +62,7 @@ class Knowledge:
     declination: float = 0.0
     attitude: AttitudeFilter = field(default_factory=AttitudeFilter)
     wheels: WheelReading | None = None
+    speed: float = 0.0
     inertial: InertialReading | None = None
     compass: CompassReading | None = None
     pressure: PressureReading | None = None
@@ -162,7 +163,7 @@ def ranging_beacon(known: Knowledge, reading: BeaconReading) -> Message:
 
 
 def gps_raw_int(known: Knowledge) -> Message:
-    """Return GPS_RAW_INT; without a fix it repeats the last position and stamp with fix type 1, as receivers do."""
+    """Return GPS_RAW_INT; without a fix the last position and stamp with fix type 1, as receivers do."""
     gnss = known.gnss
     if gnss is None:
         return _no_gps(mavlink.GPS_FIX_TYPE_NO_GPS, 0)
@@ -207,16 +208,15 @@ def scaled_pressure(known: Knowledge) -> Message | None:
 
 
 def vfr_hud(known: Knowledge) -> Message | None:
-    """Return VFR_HUD: speed by the wheels' command, heading in whole degrees, altitude by the barometer."""
+    """Return VFR_HUD: speed by the wheels, heading in whole degrees, altitude by the barometer."""
     if known.inertial is None or known.truth is None:
         return None
     altitude = known.origin.altitude
     if known.pressure is not None:
         altitude = standard_altitude(known.pressure.pressure)
-    speed = known.truth.command.speed
     heading = round(math.degrees(known.attitude.yaw)) % 360
-    throttle = min(100, max(0, round(100.0 * speed / FULL_SPEED)))
-    return mavlink.MAVLink_vfr_hud_message(0.0, abs(speed), heading, throttle, altitude, 0.0)
+    throttle = min(100, max(0, round(100.0 * known.truth.command.speed / FULL_SPEED)))
+    return mavlink.MAVLink_vfr_hud_message(0.0, abs(known.speed), heading, throttle, altitude, 0.0)
 
 
 def system_time(known: Knowledge, time: float) -> Message:
@@ -241,7 +241,7 @@ FULL_SPEED = 3.0
 
 
 def position_target(known: Knowledge, time: float) -> Message | None:
-    """Return POSITION_TARGET_LOCAL_NED: the commanded velocity, turned north by the autopilot's own yaw, and yaw rate."""
+    """Return POSITION_TARGET_LOCAL_NED: velocity, turned north by its own yaw, and yaw rate."""
     if known.truth is None:
         return None
     command, yaw = known.truth.command, known.attitude.yaw
@@ -264,7 +264,7 @@ def position_target(known: Knowledge, time: float) -> Message | None:
 
 
 def servo_output_raw(known: Knowledge, time: float) -> Message | None:
-    """Return SERVO_OUTPUT_RAW: pulses of 1000 to 2000 microseconds, left motor on 1, right motor on 3; 32-bit stamp."""
+    """Return SERVO_OUTPUT_RAW: pulses of 1000 to 2000 microseconds, left on 1, right on 3; 32-bit stamp."""
     if known.truth is None:
         return None
     command = known.truth.command

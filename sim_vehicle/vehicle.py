@@ -1,7 +1,8 @@
 """The whole vehicle: one queue of events that measures, streams and delivers, in the order of its own time.
 
-Time is seconds since the drive began. :meth:`Vehicle.advance` runs up to a time and returns the frames that have arrived
-by then; whether that time follows a clock or not is the caller's affair, and the bytes are the same.
+Time is seconds since the drive began. :meth:`Vehicle.advance` runs up to a time and returns the frames that
+have arrived by then; whether that time follows a clock or not is the caller's affair, and the bytes are the
+same.
 """
 
 from __future__ import annotations

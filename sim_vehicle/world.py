@@ -1,8 +1,8 @@
 """The truth: where the rover is, how it moves, how far its wheels have rolled.
 
-The body moves on flat ground. Within one step of the grid the rates change linearly, and the step's arc is exact for
-its mean rates, so a circle at a steady rate is a circle. Between the grid's points the truth is interpolated; who asks
-does not change the drive.
+The body moves on flat ground. Within one step of the grid the rates change linearly, and the step's arc is
+exact for its mean rates, so a circle at a steady rate is a circle. Between the grid's points the truth is
+interpolated; who asks does not change the drive.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``beacons``: wheels, a gyro and ranges, no satellites: whether dead reckoning and four beacons keep a rover found."""
+"""``beacons``: wheels, a gyro, ranges, no satellites: do four beacons keep a dead-reckoning rover found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The yard that rovers of several scenarios drive in: 60 m by 60 m, a beacon in each corner, a course drawn at random."""
+"""The yard that rovers drive in: 60 m by 60 m, a beacon in each corner, a course drawn at random."""
 
 from __future__ import annotations
 

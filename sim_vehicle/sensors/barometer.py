@@ -1,4 +1,4 @@
-"""A barometer: the standard atmosphere's pressure at the true altitude, with drift and noise (ICAO Doc 7488)."""
+"""A barometer: the standard atmosphere's pressure (ICAO Doc 7488) with drift and noise."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _EXPONENT = 5.25588
 
 
 def standard_pressure(altitude: float) -> float:
-    """Return the pressure in pascal of the standard atmosphere at an altitude in metres, below the tropopause."""
+    """Return the standard atmosphere's pressure in pascal at an altitude in metres, below 11 km."""
     return SEA_LEVEL_PRESSURE * (1.0 - _LAPSE * altitude / _SEA_LEVEL_TEMPERATURE) ** _EXPONENT
 
 
@@ -28,7 +28,7 @@ def standard_altitude(pressure: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class BarometerSettings:
-    """Facts of the barometer: white ``noise`` and wandering ``drift`` in pascal, ``temperature`` in kelvin."""
+    """Facts of the barometer: white ``noise`` and wandering ``drift`` in pascal; kelvin."""
 
     cadence: Cadence
     noise: float = 0.0

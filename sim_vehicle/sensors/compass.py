@@ -23,14 +23,15 @@ class CompassSettings:
     cadence : Cadence
         When it is read.
     earth : Vector
-        The Earth's field at the site: toward true north, east and down. East is not zero where there is declination.
+        The Earth's field at the site: toward true north, east and down. East is not zero where there is
+        declination.
     hard_iron : Vector
         What the rover's own iron adds, in the body's axes.
     noise : float
         Standard deviation per axis, white.
     disturbance, disturbance_correlation : float
-        Standard deviation of the heading's wandering error (radians: cables, fences, parked cars), and how long it
-        lasts (s).
+        Standard deviation of the heading's wandering error (radians: cables, fences, parked cars), and how
+        long it lasts (s).
     """
 
     cadence: Cadence
@@ -54,7 +55,7 @@ class CompassReading:
     field: Vector
 
     def heading(self, declination: float) -> float:
-        """Return the heading that the field shows for a level body, radians from true north, not wrapped to a range."""
+        """Return the heading that the field shows for a level body, radians from true north, not wrapped."""
         return math.atan2(-self.field[1], self.field[0]) + declination
 
 

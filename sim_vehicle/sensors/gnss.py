@@ -1,7 +1,7 @@
-"""A satellite receiver: position and velocity with wandering and white errors, late, and honest about its accuracy.
+"""A satellite receiver: position and velocity with errors, late, and honest about its accuracy.
 
-The errors and the claimed accuracy grow together with a dilution that wanders too. Without satellites it goes on
-talking, as receivers do: no fix, position and time of the last one.
+The errors and the claimed accuracy grow together with a dilution that wanders too. Without satellites it goes
+on talking, as receivers do: no fix, position and time of the last one.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""An inertial unit: three gyros and three accelerometers, with bias, random walk of the bias, and white noise.
+"""An inertial unit: three gyros and three accelerometers, with bias, its walk, and white noise.
 
-The body stands level, so the yaw gyro sees the turn, the forward accelerometer the change of speed, the right one the
-turn's v·ω, and the down one gravity (specific force: minus g when standing).
+The body stands level, so the yaw gyro sees the turn, the forward accelerometer the change of speed, the right
+one the turn's v·ω, and the down one gravity (specific force: minus g when standing).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Wheel encoders: how far the left and the right wheels say that they have rolled, in all.
 
-They read long or short by a scale, spin a little against the ground all the time and a lot now and then, and count in
-whole ticks of a counter that goes on from where it was.
+They read long or short by a scale, spin a little against the ground all the time and a lot now and then, and
+count in whole ticks of a counter that goes on from where it was.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ class WheelSettings:
     slip, slip_correlation : float
         Standard deviation of the share of spin against the ground, and how long it lasts (s).
     burst_interval, burst_length, burst_slip : float
-        Mean seconds between two bursts of spinning, mean length of one (s), its mean share. 0 as interval: none.
+        Mean seconds between two bursts of spinning, mean length of one (s), its mean share. 0 as interval:
+        none.
     """
 
     cadence: Cadence
