@@ -42,7 +42,7 @@ class Vehicle(Section):
     """Which vehicle this is and how it moves."""
 
     name: Name
-    """Its name in every key: beliefd/v1/<name>/estimate."""
+    """Its name in every key: beliefd/v1/NAME/estimate."""
     motion: MotionModel = "unicycle"
     """Motion model: unicycle for whatever drives with its nose ahead."""
 
@@ -188,7 +188,7 @@ class Beacon(Section):
         if (self.position is None) == (given == 0) or given not in (0, 3):
             raise PydanticCustomError(
                 "beacon",
-                "needs position (north, east, down), or latitude, longitude and altitude, not both or parts",
+                "needs either position (north, east, down), or latitude, longitude and altitude",
             )
         return self
 

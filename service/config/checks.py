@@ -17,7 +17,7 @@ from service.config.section import shown
 Table = Mapping[str, Any]
 
 # What the file may name already and this version does not do yet; the words say what it does.
-_NOT_BUILT: dict[tuple[str, str], tuple[frozenset[object], str]] = {
+NOT_BUILT: dict[tuple[str, str], tuple[frozenset[object], str]] = {
     ("vehicle", "motion"): (frozenset({"constant_velocity", "drift", "inertial"}), "unicycle"),
     ("sensor", "kind"): (
         frozenset({"bearing", "range_bearing", "altitude", "terrain", "scan"}),
@@ -67,8 +67,10 @@ def _repeated(raw: Table, name: str, key: str) -> Iterator[str]:
 
 
 def _unknown_links(raw: Table) -> Iterator[str]:
+    links = raw.get("link")
     names = [link["name"] for _, link in entries(raw, "link") if isinstance(link.get("name"), str)]
-    if not names:  # a site: its recording has the links
+    # none: a site, its recording has the links; some without a name: it may be meant, and is an error already
+    if not isinstance(links, list) or not links or len(names) < len(cast("list[object]", links)):
         return
     for place, sensor in entries(raw, "sensor"):
         link = sensor.get("link")
@@ -88,20 +90,20 @@ def _unknown_beacons(raw: Table) -> Iterator[str]:
 
 def _area_of_a_global_start(raw: Table) -> Iterator[str]:
     if table(raw, "start").get("mode") == "global" and "area" not in raw:
-        yield 'area: is missing; start, mode = "global" needs [area] with north = [lowest, highest] and east'
+        yield 'area: is missing; start, mode = "global" needs [area] with north and east'
 
 
 def _budget_within_a_tick(raw: Table) -> Iterator[str]:
     rate, spent = table(raw, "loop").get("rate", 50.0), table(raw, "budget").get("cpu_ms", 4.0)
     if not isinstance(rate, int | float) or not isinstance(spent, int | float):
         return
-    if rate > 0 and spent * rate > 1000:
+    if 0 < rate <= 1000 and spent > 1000 / rate:
         tick = f"{1000 / rate:g} ms at loop, rate = {rate:g}"
         yield f"budget, cpu_ms: needs at most one tick ({tick}), got {spent:g}"
 
 
 def _not_built(raw: Table) -> Iterator[str]:
-    for (name, key), (planned, built) in _NOT_BUILT.items():
+    for (name, key), (planned, built) in NOT_BUILT.items():
         for place, entry in entries(raw, name):
             value = entry.get(key)
             if isinstance(value, str) and value in planned:

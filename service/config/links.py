@@ -120,7 +120,7 @@ class CanLink(Section):
 
 
 class ZenohLink(Section):
-    """Samples that others publish under <prefix>/<vehicle>/sample/<sensor>."""
+    """Samples that others publish under PREFIX/VEHICLE/sample/SENSOR."""
 
     name: Name
     """What sensors, logs and status call this link."""

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from service.config.checks import across_sections, resolved
 from service.config.complaints import ConfigurationError, complaints
 from service.config.configuration import Configuration, Site
+from service.config.section import one_line
 
 SiteType = TypeVar("SiteType", Configuration, Site)
 
@@ -24,6 +25,8 @@ def _content(path: Path) -> dict[str, Any]:
         raise ConfigurationError(
             [f"{path.name}: not UTF-8 text: {error.reason} at byte {error.start}"]
         ) from error
+    except ValueError as error:  # tomllib lets Python's own limit on digits through
+        raise ConfigurationError([f"{path.name}: not a configuration: {error}"]) from error
     except RecursionError as error:
         raise ConfigurationError([f"{path.name}: not a configuration: nested too deeply"]) from error
     except OSError as error:
@@ -60,7 +63,7 @@ def validated(raw: dict[str, Any], model: type[SiteType], name: str) -> SiteType
         found += complaints(error, raw, model)
     found += across_sections(raw)
     if configuration is None or found:
-        raise ConfigurationError([f"{name}: {line}" for line in found])
+        raise ConfigurationError([one_line(f"{name}: {line}") for line in found])
     return configuration
 
 

@@ -50,7 +50,7 @@ class Publish(Section):
     """What goes out, and where."""
 
     prefix: Annotated[str, Field(pattern=r"^[^/#?$*\s]+(/[^/#?$*\s]+)*$")] = "beliefd/v1"
-    """Start of every key: <prefix>/<vehicle>/estimate."""
+    """Start of every key: PREFIX/VEHICLE/estimate."""
     zenoh: str = ""
     """A Zenoh JSON5 configuration file.
 

@@ -30,12 +30,17 @@ NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 
 
+def one_line(text: str) -> str:
+    """Return a text with what would break its line or colour the terminal written as escapes."""
+    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
+
+
 def shown(value: object) -> str:
     """Return a value as the file would write it, short enough for one line."""
     if isinstance(value, bool):
         words = str(value).lower()
     elif isinstance(value, str):
-        words = '"' + value.replace("\n", "\\n") + '"'
+        words = one_line(f'"{value}"')
     elif isinstance(value, dict):
         words = "a table"
     elif isinstance(value, date | time):
