@@ -15,7 +15,7 @@ import msgspec
 
 from drivers.sample import AnyReading
 
-_HALF_TURN = math.pi * (1.0 + 1e-9)
+_HALF_TURN = math.pi * (1.0 + 1e-12)
 _TURN = 2.0 * _HALF_TURN
 _TINY = 1e-9
 

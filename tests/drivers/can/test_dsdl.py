@@ -47,7 +47,9 @@ def oracle(data_type: DataType, payload: bytes, tail_array_optimised: bool) -> A
 @pytest.mark.parametrize("data_type", TYPES, ids=lambda t: t.name)
 @given(data=st.data(), tail=st.booleans())
 @settings(max_examples=60, deadline=None)
-def test_any_bytes_read_as_the_dronecan_package_reads_them(data_type: DataType, data: st.DataObject, tail: bool) -> None:
+def test_any_bytes_read_as_the_dronecan_package_reads_them(
+    data_type: DataType, data: st.DataObject, tail: bool
+) -> None:
     payload = data.draw(st.binary(max_size=data_type.largest + 2))
     try:
         expected = oracle(data_type, payload, tail)
@@ -94,7 +96,9 @@ def fill(message: Any, numbers: Any) -> None:
 def test_a_field_that_straddles_bytes_by_hand() -> None:
     """esc.Status: 32 bits of errors, three half floats, then 18 bits of rpm = 0x12345 & 0x1FFFF."""
     rpm = 0x12345
-    straddling = f"{rpm & 0xFF:08b}{rpm >> 8 & 0xFF:08b}{rpm >> 16 & 3:02b}" + f"{100:07b}" + f"{5:05b}" + "00"
+    straddling = (
+        f"{rpm & 0xFF:08b}{rpm >> 8 & 0xFF:08b}{rpm >> 16 & 3:02b}" + f"{100:07b}" + f"{5:05b}" + "00"
+    )
     payload = struct.pack("<Ieee", 7, 12.5, -1.5, 300.0) + int(straddling, 2).to_bytes(4, "big")
     status = next(t for t in TYPES if t.name == "esc.Status").unpack(payload)
     assert status == {

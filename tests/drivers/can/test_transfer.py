@@ -1,4 +1,5 @@
-"""Reassembly against hand-built frames: the order of tail bytes, the checksum, and everything that can be lost."""
+"""Reassembly against hand-built frames: the order of tail bytes, the checksum, and everything that can be
+lost."""
 
 from __future__ import annotations
 
@@ -28,7 +29,11 @@ def test_a_single_frame_by_hand() -> None:
     reassembler = Reassembler(DATA_TYPES)
     transfer = reassembler.accept(CanFrame(0x1004042A, data), 5)
     assert transfer is not None
-    assert (transfer.data_type.name, transfer.source, transfer.received_ns) == ("air_data.StaticPressure", 42, 5)
+    assert (transfer.data_type.name, transfer.source, transfer.received_ns) == (
+        "air_data.StaticPressure",
+        42,
+        5,
+    )
     assert transfer.data_type.unpack(transfer.payload) == {
         "static_pressure": 101325.0,
         "static_pressure_variance": 1.0,
@@ -36,7 +41,8 @@ def test_a_single_frame_by_hand() -> None:
 
 
 def test_a_transfer_of_several_frames_by_hand() -> None:
-    """esc.Status, 14 bytes of zeros from node 1: the checksum worked out bit by bit, the toggle from frame to frame."""
+    """esc.Status, 14 bytes of zeros from node 1: the checksum worked out bit by bit, the toggle from frame to
+    frame."""
     signature = 0xA9AF28AEA2FBB254  # of uavcan.equipment.esc.Status, from the specification's list of types
     checksum = bitwise_checksum(bytes(14), bitwise_checksum(signature.to_bytes(8, "little"), 0xFFFF))
     payload = checksum.to_bytes(2, "little") + bytes(14)
@@ -184,7 +190,9 @@ IDENTIFIERS = st.one_of(
 
 @given(st.lists(st.tuples(IDENTIFIERS, st.binary(max_size=64), st.booleans(), st.booleans()), max_size=200))
 @settings(max_examples=200, deadline=None)
-def test_no_frames_whatever_raise_or_take_more_memory_than_their_types(some: list[tuple[int, bytes, bool, bool]]) -> None:
+def test_no_frames_whatever_raise_or_take_more_memory_than_their_types(
+    some: list[tuple[int, bytes, bool, bool]],
+) -> None:
     reassembler = Reassembler(DATA_TYPES)
     for at, (identifier, data, extended, flexible) in enumerate(some):
         reassembler.accept(CanFrame(identifier, data, extended, flexible), at * SECOND // 10)

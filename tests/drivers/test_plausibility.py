@@ -1,0 +1,87 @@
+"""The limits of what a driver lets in."""
+
+from __future__ import annotations
+
+import math
+import typing
+
+import pytest
+
+from drivers.plausibility import implausible
+from drivers.sample import (
+    ActuatorCommand,
+    AnyReading,
+    Attitude,
+    GeodeticPosition,
+    Heading,
+    Inertial,
+    LocalPosition,
+    MotionCommand,
+    Odometer,
+    Presence,
+    Pressure,
+    Range,
+)
+
+HALF = math.pi / 2
+
+
+@pytest.mark.parametrize(
+    "reading",
+    [
+        GeodeticPosition(latitude=HALF, longitude=-math.pi),
+        GeodeticPosition(latitude=-HALF, longitude=math.pi, altitude=-430.0, sigma_horizontal=0.01),
+        Range(beacon=0, distance=0.0),
+        Heading(heading=2 * math.pi),
+        Odometer(distance=(-5.0, 1e8)),
+        MotionCommand(velocity=(1.0, 0.0, 0.0), body=True),
+        ActuatorCommand((None, -1.0, 1.0)),
+        Presence(type=10, autopilot=3, armed=True, system_status=4),
+    ],
+)
+def test_what_can_be_true(reading: AnyReading) -> None:
+    assert implausible(reading) is None
+
+
+@pytest.mark.parametrize(
+    ("reading", "field"),
+    [
+        (GeodeticPosition(latitude=-35.4, longitude=1.0), "latitude"),
+        (GeodeticPosition(latitude=1.0, longitude=149.0), "longitude"),
+        (GeodeticPosition(latitude=1.0, longitude=1.0, sigma_horizontal=0.0), "sigma_horizontal"),
+        (GeodeticPosition(latitude=1.0, longitude=1.0, altitude=-1e6), "altitude"),
+        (LocalPosition(north=1e7, east=0.0), "north"),
+        (Range(beacon=-1, distance=1.0), "beacon"),
+        (Range(beacon=1, distance=-0.1), "distance"),
+        (Range(beacon=1, distance=1.0, sigma=-1.0), "sigma"),
+        (Heading(heading=270.0), "heading"),
+        (Attitude(roll=0.0, pitch=0.0, yaw=90.0), "yaw"),
+        (Inertial(specific_force=(0.0, math.nan, 0.0)), "specific_force"),
+        (Inertial(magnetic_field=(25.0, 0.0, 0.0)), "magnetic_field"),
+        (Odometer(distance=(0.0,) * 257), "distance"),
+        (Pressure(absolute=0.0), "absolute"),
+        (ActuatorCommand((0.0, 1.1)), "channels"),
+    ],
+)
+def test_what_cannot(reading: AnyReading, field: str) -> None:
+    assert implausible(reading) == field
+
+
+@pytest.mark.parametrize("kind", typing.get_args(AnyReading), ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
+def test_no_number_of_any_reading_may_be_other_than_finite(kind: type[AnyReading], wrong: float) -> None:
+    """Every float field of every reading, one at a time, among zeros and ones."""
+    hints = typing.get_type_hints(kind)
+    names = kind.__struct_fields__
+    fine: dict[str, typing.Any] = {name: plain(hints[name]) for name in names}
+    floats = [name for name in names if "float" in str(hints[name])]
+    for name in floats:
+        value = wrong if not isinstance(fine[name], tuple) else (fine[name][0], wrong, *fine[name][2:])
+        assert implausible(kind(**{**fine, name: value})) == name
+
+
+def plain(hint: object) -> object:
+    text = str(hint)
+    if "tuple" in text:
+        return (0.5, 0.5, 0.5)
+    return True if "bool" in text else 1
