@@ -123,6 +123,11 @@ class ParticleFilter(Generic[Control]):
         return self._particles.columns[self._particles.row(name), : self.count]
 
     @property
+    def columns(self) -> Float32Array:
+        """View of all dimensions, (dimension, capacity) float32; the first ``count`` are particles."""
+        return self._particles.columns
+
+    @property
     def weights(self) -> Float32Array:
         """View of the weights, (count,) float32, relative to the largest."""
         self._settle()
@@ -255,7 +260,7 @@ class ParticleFilter(Generic[Control]):
         return Moments(self.names, mean, covariance, variance, self.effective_sample_size)
 
     def resample(self, count: int | None = None) -> None:
-        """Lines 8 to 11 by Table 4.4: draw ``count`` equally weighted particles (default: as many as there are).
+        """Lines 8 to 11 by Table 4.4: draw ``count`` particles, equally weighted; as many as now by default.
 
         The copies are dealt to the blocks in turn, so every block is a fair sample of the whole.
 
