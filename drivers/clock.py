@@ -25,13 +25,10 @@ EXCHANGE_STALE = 30 * SECOND
 SLOWEST_EXCHANGE = 10 * SECOND
 OFF_LINE = SECOND  # a stamp that much behind the newest, or ahead of what is possible, is not on this line
 LATEST = 5 * SECOND  # nor is one that is later than that: no link holds data back so long, and steadily
-NEW_LINE_AFTER = (
-    3  # stamps in a row that advance as time does make a new line (reboot, clock set, clock stopped)
-)
-NEW_LINE_WITHIN = 750_000_000  # as time does: to the worst jitter of arrival seen on a real autopilot
-NEW_LINE_SPAN = (
-    2 * SECOND
-)  # for that long, unless they lie behind: a backlog that is delivered late advances faster
+# Stamps in a row that advance as time does make a new line (reboot, clock set or stopped): so many, …
+NEW_LINE_AFTER = 3
+NEW_LINE_WITHIN = 750_000_000  # … within the worst jitter of arrival seen on a real autopilot, …
+NEW_LINE_SPAN = 2 * SECOND  # … for so long unless they lie behind: a backlog delivered late advances faster
 LONGEST_LATENCY = 2 * SECOND  # TIMESYNC further than this below the envelope speaks of another clock
 EPOCH_FROM_US = 10**15  # 31 years since boot, or September 2001: a stamp beyond is Unix time
 
@@ -51,11 +48,11 @@ NANOSECONDS = StampKind(1, None)
 
 
 class Waiting(NamedTuple):
-    """Stamps off the line that may make a new one: the first of them, when it came, how many since."""
+    """Stamps off the line that may make a new one: the first of them, when it came, how many so far."""
 
     raw: int
     received: int
-    count: int
+    seen: int
 
 
 class Envelope:
@@ -234,9 +231,9 @@ class ClockMap:
         if first is None or abs(raw - first.raw - (received - first.received)) > NEW_LINE_WITHIN:
             self._pending[kind] = Waiting(raw, received, 1)
             return False
-        self._pending[kind] = first = first._replace(count=first.count + 1)
+        self._pending[kind] = first = first._replace(seen=first.seen + 1)
         long_enough = raw < newest - OFF_LINE or received - first.received >= NEW_LINE_SPAN
-        return first.count >= NEW_LINE_AFTER and raw > first.raw and long_enough
+        return first.seen >= NEW_LINE_AFTER and raw > first.raw and long_enough
 
 
 class DeviceClocks:

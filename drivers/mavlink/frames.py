@@ -147,6 +147,11 @@ class FrameScanner:
                 at = self._skip(data, at, frame)
         self._buffer = data[at:]
 
+    def forget(self) -> None:
+        """Drop what is left of a frame, when the stream that it belonged to has ended."""
+        self._buffer = b""
+        self._lost = False
+
     @staticmethod
     def _plausible(data: bytes, at: int, frame: Frame) -> bool:
         """Whether an unknown message is believed: another frame, or nothing, follows it."""
