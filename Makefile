@@ -1,0 +1,50 @@
+# beliefd: every target makes what it needs, from a fresh clone.  `make help` lists them.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+
+.DEFAULT_GOAL := help
+.PHONY: help install demo test lint format bench system docs clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
+
+$(INSTALLED): pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "beliefd needs Python 3.11 or newer; PYTHON=... make install chooses one")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+install: $(INSTALLED) ## set up .venv and compile the kernels
+	$(BIN)/beliefd warm
+
+demo: install ## the main job, live in the terminal for a minute
+	$(BIN)/beliefd demo
+
+test: install ## every test
+	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+lint: $(INSTALLED) ## style, types and the walls between the packages
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+	$(BIN)/pyright --warnings
+
+format: $(INSTALLED) ## let ruff rewrite the sources
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: install ## what this machine affords, and how the loop keeps its deadlines
+	$(BIN)/python benchmarks/step.py
+	$(BIN)/python benchmarks/deadline.py
+
+system: install ## the daemon under real systemd with a real vcan0, in a guest
+	bash tests/system/run.sh
+
+docs: $(INSTALLED) ## the pages that are generated
+	$(BIN)/python -m service.config.reference > docs/configuration.md
+
+clean: ## remove everything that was made
+	rm -rf $(VENV) .vm build dist .pytest_cache .ruff_cache .hypothesis .coverage

@@ -1,0 +1,6 @@
+"""The estimator: binds samples to the models of :mod:`filters`; no clock, no process."""
+
+from service.estimator.estimator import Estimator
+from service.estimator.stopwatch import Silent, Stopwatch
+
+__all__ = ["Estimator", "Silent", "Stopwatch"]

@@ -1,0 +1,375 @@
+"""The estimator: samples in, estimates out, with no clock and no process of its own.
+
+It binds what the wire said to the models of :mod:`filters` and keeps the belief at a delayed horizon: measurements
+wait in the :class:`~service.timeline.Timeline` until the horizon passes them, the particle filter takes them in order
+(Table 4.3), and an output predictor carries the moments from there to now with the controls already received. The
+daemon's loop and a replay drive the very same object; only where ``now`` and ``afforded`` come from differs.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.sample import GeodeticPosition, LocalPosition, Origin, Sample
+from filters.kld import Demand
+from filters.particle import ParticleFilter
+from service.config import Configuration
+from service.estimate import Estimate, SensorStatus
+from service.estimator.binding import (
+    BoundSensor,
+    Measurement,
+    Place,
+    Refusal,
+    SensorRecord,
+    position_of,
+)
+from service.estimator.controls import SECOND, Controls
+from service.estimator.output import Output
+from service.estimator.start import Anchor, draw
+from service.estimator.stopwatch import Silent, Stopwatch
+from service.estimator.vehicle import Vehicle
+from service.geodesy import Geodetic, LocalFrame
+from service.health import Facts, HealthMonitor
+from service.timeline import FUTURE_TOLERANCE, Timeline
+
+STRIDE = SECOND // 10
+"""The belief is moved at each measurement, and at least this often: a chord of 0.1 s is still a good arc."""
+
+TOGETHER = SECOND // 1000
+"""Measurements within a millisecond are weighed at one time."""
+
+RESAMPLE_BELOW = 0.5
+"""Share of the particles: equation 4.36's effective sample size below it asks for resampling."""
+
+POSITION_BIN = 0.25
+HEADING_BIN = 0.1
+"""Sides of the bins that the KLD bound counts: metres and radians."""
+
+DEMAND_INTERVAL = SECOND // 5
+GROWTH = 1.25
+"""The set grows between resamplings only if the demand is this much larger than the count."""
+
+
+class Waiting(NamedTuple):
+    """A sample on its way to the sensor that wants it."""
+
+    sensor: BoundSensor
+    sample: Sample
+
+
+class Estimator:
+    """A vehicle's belief, fed with samples.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        The configuration; in a replay possibly without vehicle and links.
+    stopwatch : Stopwatch
+        What the stages of a tick are charged to.
+    seed : int
+        Of the random numbers: same samples, counts and seed, same bytes.
+    """
+
+    def __init__(
+        self, configuration: Configuration, stopwatch: Stopwatch | None = None, seed: int = 0
+    ) -> None:
+        self.configuration = configuration
+        self.seed = seed
+        self.health = HealthMonitor()
+        self.reset_counter = 0
+        self._stopwatch: Stopwatch = stopwatch or Silent()
+        self._vehicle = Vehicle(configuration)
+        self._controls: Controls = self._vehicle.controls
+        self._sensors = [
+            BoundSensor(s, {b.id: b for b in configuration.beacon}) for s in configuration.sensor
+        ]
+        self._filter = ParticleFilter(
+            self._vehicle.motion,
+            capacity=configuration.budget.particles_max,
+            seed=seed,
+            slow=self._vehicle.slow_states,
+        )
+        self._demand_of = Demand(
+            POSITION_BIN,
+            HEADING_BIN,
+            minimum=configuration.budget.particles_min,
+            maximum=configuration.budget.particles_max,
+        )
+        self._timeline: Timeline[Waiting] = Timeline()
+        self._records: dict[str, SensorRecord] = {}
+        self._heard: set[str] = set()
+        self._unwanted: Counter[str] = Counter()
+        self._frame = self._configured_frame()
+        self._output = Output(self._vehicle, self._filter)
+        self._belief_time: int | None = None
+        self._demand = configuration.budget.particles_min
+        self._demand_time = -(2**62)
+        self._sequence = 0
+        self._last_status: int | None = None
+
+    # --- samples in ---------------------------------------------------------------------------------------------
+
+    def ingest(self, samples: Iterable[Sample]) -> None:
+        """Take samples as they arrive: controls at once, measurements into the timeline, the rest counted."""
+        for sample in samples:
+            reading = sample.reading
+            if isinstance(reading, Origin):
+                self._learn_origin(Geodetic(reading.latitude, reading.longitude, reading.altitude))
+            elif sample.time > sample.received + FUTURE_TOLERANCE:
+                self._timeline.refused["future"] += 1
+            else:
+                controlled = self._controls.take(sample)
+                if not self._queue(sample) and not controlled:
+                    self._unwanted[sample.source] += 1
+
+    def _queue(self, sample: Sample) -> bool:
+        wanted = False
+        for sensor in self._sensors:
+            if sensor.wants(sample):
+                wanted = True
+                self._heard.add(sensor.title)
+                record = self._record(sensor.name(sample))
+                record.arrivals += 1
+                reason = self._timeline.insert(
+                    Waiting(sensor, sample), sample.time - sensor.delay, sample.received
+                )
+                if reason is not None:
+                    record.refused[reason] += 1
+        return wanted
+
+    def _record(self, name: str) -> SensorRecord:
+        return self._records.setdefault(name, SensorRecord())
+
+    def _configured_frame(self) -> LocalFrame | None:
+        origin = self.configuration.origin
+        if origin is None:
+            return None
+        return LocalFrame.from_degrees(origin.latitude, origin.longitude, origin.altitude)
+
+    def _learn_origin(self, origin: Geodetic) -> None:
+        if self._frame is None:
+            self._frame = LocalFrame(origin)
+
+    # --- one tick -----------------------------------------------------------------------------------------------
+
+    def tick(self, now: int, unix: int, afforded: int) -> Estimate:
+        """Move the horizon to ``now`` less its delay and return the belief, carried to ``now``.
+
+        Parameters
+        ----------
+        now, unix : int
+            The tick's time, nanoseconds, on the monotonic and on the Unix clock.
+        afforded : int
+            How many particles the budget allows.
+        """
+        horizon = now - round(self.configuration.loop.horizon_ms * 1e6)
+        passed = self._timeline.release(horizon)
+        self._stopwatch.lap("ingest")
+        afforded = min(afforded, self._filter.capacity)
+        if self._belief_time is None:
+            passed = self._try_start(horizon, passed, afforded)
+        if self._belief_time is not None:
+            self._fuse(passed, afforded)
+            if horizon - self._belief_time >= STRIDE:
+                self._advance(horizon)
+            self._fit_count(afforded)
+            self._controls.forget(self._belief_time - SECOND)
+            self._reckon_demand(now)
+        estimate = self._speak(now, unix, afforded)
+        self._sequence += 1
+        self._stopwatch.lap("extraction")
+        return estimate
+
+    def _fuse(self, passed: list[tuple[int, Waiting]], afforded: int) -> None:
+        assert self._belief_time is not None
+        fused = False
+        for time, waiting in passed:
+            if fused and time - self._belief_time > TOGETHER:
+                self._resample_if_worn(afforded)
+                fused = False
+            if not fused:
+                self._advance(time)
+            self._weigh(time, waiting)
+            fused = True
+        if fused:
+            self._resample_if_worn(afforded)
+
+    def _advance(self, time: int) -> None:
+        """Predict the belief to ``time`` in strides (line 4 of Table 4.3)."""
+        assert self._belief_time is not None
+        stride = max(STRIDE, (time - self._belief_time) // 50)
+        while time > self._belief_time:
+            step = min(time, self._belief_time + stride)
+            self._vehicle.predict(self._filter, self._belief_time, step)
+            self._belief_time = step
+        self._stopwatch.lap("motion")
+
+    def _weigh(self, time: int, waiting: Waiting) -> None:
+        """Weigh the particles by one measurement (line 5 of Table 4.3) and note what it said of the belief."""
+        place = Place(time, self._frame, self._vehicle.down, self._controls)
+        measured = waiting.sensor.measure(waiting.sample, place)
+        record = self._record(measured.name)
+        if isinstance(measured, Refusal):
+            record.refused[measured.reason] += 1
+            return
+        self._vehicle.level(waiting.sample.reading, self._frame)
+        self._take_evidence(time, measured, record)
+        self._stopwatch.lap("sensing")
+
+    def _take_evidence(self, time: int, measured: Measurement, record: SensorRecord) -> None:
+        evidence = self._filter.weigh(measured.model, measured.value)
+        surprise = measured.surprise(evidence.log_mean)
+        record.innovation = evidence.innovation
+        record.last = time
+        record.accepted += 1
+        if measured.absolute:
+            self.health.measured(time, measured.name, surprise)
+
+    def _resample_if_worn(self, afforded: int) -> None:
+        self._filter.normalize()
+        if self._filter.effective_sample_size < RESAMPLE_BELOW * self._filter.count:
+            self._filter.resample(self._target(afforded))
+        self._stopwatch.lap("resampling")
+
+    def _target(self, afforded: int) -> int:
+        budget = self.configuration.budget
+        return max(budget.particles_min, min(self._demand, afforded, budget.particles_max))
+
+    def _fit_count(self, afforded: int) -> None:
+        """Shrink at once when the budget shrank; grow between resamplings only when the demand grew clearly."""
+        count, target = self._filter.count, self._target(afforded)
+        if count > max(afforded, self.configuration.budget.particles_min) or target > GROWTH * count:
+            self._filter.normalize()
+            self._filter.resample(target)
+            self._stopwatch.lap("resampling")
+
+    def _reckon_demand(self, now: int) -> None:
+        if now - self._demand_time >= DEMAND_INTERVAL:
+            self._demand = self._demand_of.particles(self._filter)
+            self._demand_time = now
+            self._stopwatch.lap("resampling")
+
+    # --- start --------------------------------------------------------------------------------------------------
+
+    def _try_start(
+        self, horizon: int, passed: list[tuple[int, Waiting]], afforded: int
+    ) -> list[tuple[int, Waiting]]:
+        """Start the belief if what is needed has come; return the measurements that lie after the start."""
+        if self.configuration.start.mode == "first_fix":
+            return self._start_at_fix(passed, afforded)
+        first = min((time for time, _ in passed), default=horizon)
+        control = self._controls.earliest
+        if not passed and (control is None or control > horizon):
+            return passed
+        time = first if control is None else min(first, max(control, horizon - SECOND))
+        start = self.configuration.start
+        anchor = None if start.position is None else Anchor(start.position, start.sigma)
+        self._start(time, anchor, afforded)
+        return passed
+
+    def _start_at_fix(self, passed: list[tuple[int, Waiting]], afforded: int) -> list[tuple[int, Waiting]]:
+        for index, (time, waiting) in enumerate(passed):
+            reading = waiting.sample.reading
+            if isinstance(reading, GeodeticPosition | LocalPosition):
+                if isinstance(reading, GeodeticPosition):
+                    altitude = 0.0 if reading.altitude is None else reading.altitude
+                    self._learn_origin(Geodetic(reading.latitude, reading.longitude, altitude))
+                fix = position_of(reading, self._frame)
+                if fix is None:
+                    continue
+                sigma = waiting.sensor.sigma(reading.sigma_horizontal)
+                down_sigma = reading.sigma_vertical or 2 * sigma
+                self._start(time, Anchor(fix, (sigma, sigma, down_sigma)), afforded)
+                return passed[index + 1 :]
+        return []
+
+    def _start(self, time: int, anchor: Anchor | None, afforded: int) -> None:
+        count = max(self.configuration.budget.particles_min, min(afforded, self._filter.capacity))
+        self._filter.initialize(draw(self.configuration, self._filter.names, count, self.seed, anchor))
+        self._vehicle.stand_at(anchor)
+        self._belief_time = time
+        self.health.restart()
+
+    # --- estimates out ------------------------------------------------------------------------------------------
+
+    def _speak(self, now: int, unix: int, afforded: int) -> Estimate:
+        pose = None
+        if self._belief_time is not None:
+            pose = self._output.at(self._belief_time, now)
+        facts = Facts(
+            now,
+            self._belief_time is not None,
+            self.missing,
+            pose.radius95 if pose else None,
+            afforded,
+            self.configuration.budget.particles_min,
+        )
+        state = self.health.judge(facts)
+        return self._output.estimate(
+            pose,
+            self._frame,
+            sequence=self._sequence,
+            time=unix / SECOND,
+            monotonic_ns=now,
+            health=state,
+            reason=self.health.reason,
+            level=int(afforded < self._demand) if pose else 0,
+            demanded=self._demand,
+            afforded=afforded,
+            reset_counter=self.reset_counter,
+        )
+
+    @property
+    def demand(self) -> int:
+        """How many particles the belief needs (KLD bound)."""
+        return self._demand
+
+    @property
+    def missing(self) -> list[str]:
+        """What the belief waits for, in the user's words."""
+        distance, turn = self._controls.sources
+        absent = [s.title for s in self._sensors if s.title not in self._heard]
+        if distance is None:
+            absent.insert(0, "odometry")
+        if turn is None:
+            absent.insert(1 if distance is None else 0, "yaw rate")
+        return absent
+
+    @property
+    def drops(self) -> dict[str, int]:
+        """What came and was not used, since the start."""
+        counts = dict(self._timeline.refused)
+        if self._controls.out_of_order:
+            counts["control out of order"] = self._controls.out_of_order
+        return counts
+
+    def sensors(self, now: int) -> list[SensorStatus]:
+        """Return every sensor's status; rates are over the time since the last call."""
+        elapsed = SECOND if self._last_status is None else max(1, now - self._last_status)
+        self._last_status = now
+        statuses: list[SensorStatus] = []
+        for name, record in sorted(self._records.items()):
+            statuses.append(
+                SensorStatus(
+                    name,
+                    round(record.arrivals * SECOND / elapsed, 2),
+                    None,
+                    record.accepted,
+                    dict(record.refused),
+                    record.innovation,
+                    None if record.last is None else (now - record.last) / SECOND,
+                )
+            )
+            record.arrivals = 0
+        return statuses
+
+    def cloud(self, count: int) -> NDArray[np.float32]:
+        """Return a fair sub-sample of the particles at the last tick: north, east, heading, weight; (count, 4)."""
+        if self._belief_time is None:
+            return np.empty((0, 4), np.float32)
+        return self._filter.cloud(min(count, self._filter.count), self._output.displacement)

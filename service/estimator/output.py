@@ -1,0 +1,140 @@
+"""The output predictor: the belief at the horizon, carried to now and put into the words of an Estimate."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filters.density.gaussian import radius
+from filters.motion.prediction import process_covariance, velocity_moments
+from filters.belief import Displacement, Moments
+from filters.particle import ParticleFilter
+from service.estimate import Estimate, Triangle, Triple
+from service.estimator.vehicle import Vehicle
+from service.geodesy import LocalFrame
+
+UNKNOWN: Triple = (None, None, None)
+UNKNOWN_TRIANGLE: Triangle = (None, None, None, None, None, None)
+
+
+class Pose(NamedTuple):
+    """The belief at now: the particles' moments, carried; ``covariance`` of (north, east, heading)."""
+
+    moments: Moments
+    covariance: NDArray[np.float64]
+    speed: float
+    radius95: float
+
+    def mean(self, name: str) -> float:
+        """Return the mean of one column."""
+        return float(self.moments.mean[self.moments.names.index(name)])
+
+
+class Output:
+    """Carries moments from the belief's time to now and writes them down.
+
+    Attributes
+    ----------
+    displacement : Displacement or None
+        Of the last :meth:`at`; the cloud is carried by the same.
+    """
+
+    def __init__(self, vehicle: Vehicle, belief: ParticleFilter) -> None:
+        self._vehicle = vehicle
+        self._belief = belief
+        self._biases = (0.0, 1.0)
+        self.displacement: Displacement | None = None
+
+    def at(self, belief_time: int, now: int) -> Pose:
+        """Return the belief carried from ``belief_time`` to ``now`` (nanoseconds)."""
+        displacement = self._vehicle.displacement(belief_time, now, self._biases)
+        moments = self._belief.moments(displacement)
+        index = moments.names.index
+        self._biases = (
+            float(moments.mean[index("gyro_bias")]),
+            float(moments.mean[index("odometry_scale")]),
+        )
+        distance = math.hypot(displacement.forward, displacement.right)
+        heading = float(moments.mean[index("heading")])
+        noise = self._vehicle.noise(belief_time, now)
+        covariance = moments.pose_covariance + process_covariance(
+            distance, heading - 0.5 * displacement.turn, noise
+        )
+        self.displacement = displacement
+        speed = self._vehicle.controls.speed(now) * self._biases[1]
+        return Pose(moments, covariance, speed, radius(covariance[:2, :2], 0.95))
+
+    def estimate(self, pose: Pose | None, frame: LocalFrame | None, **figures: Any) -> Estimate:
+        """Write ``pose`` down; ``figures`` are the fields of :class:`Estimate` that the belief does not know."""
+        if pose is None:
+            return Estimate(
+                position=UNKNOWN,
+                velocity=UNKNOWN,
+                heading=None,
+                position_covariance=UNKNOWN_TRIANGLE,
+                velocity_covariance=UNKNOWN_TRIANGLE,
+                heading_variance=None,
+                latitude=None,
+                longitude=None,
+                altitude=None,
+                radius95=None,
+                hypotheses=0,
+                particles=0,
+                effective_sample_size=None,
+                biases={},
+                **figures,
+            )
+        north, east, heading = pose.mean("north"), pose.mean("east"), pose.mean("heading")
+        height = self._vehicle.height
+        nn, ne, ee = (float(pose.covariance[i, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
+        heading_variance = float(pose.covariance[2, 2])
+        velocity = velocity_moments(pose.speed, self._vehicle.speed_noise**2, heading, heading_variance)
+        latitude, longitude, altitude = self._geodetic(frame, north, east, height)
+        return Estimate(
+            position=(north, east, None if height is None else height[0]),
+            velocity=(velocity.north, velocity.east, None),
+            heading=heading,
+            position_covariance=(
+                nn,
+                ne,
+                None if height is None else 0.0,
+                ee,
+                None if height is None else 0.0,
+                None if height is None else height[1],
+            ),
+            velocity_covariance=(velocity.nn, velocity.ne, None, velocity.ee, None, None),
+            heading_variance=heading_variance,
+            latitude=latitude,
+            longitude=longitude,
+            altitude=altitude,
+            radius95=pose.radius95,
+            hypotheses=1,
+            particles=self._belief.count,
+            effective_sample_size=pose.moments.effective_sample_size,
+            biases=self._slow_states(pose.moments),
+            **figures,
+        )
+
+    @staticmethod
+    def _geodetic(
+        frame: LocalFrame | None, north: float, east: float, height: tuple[float, float] | None
+    ) -> Triple:
+        if frame is None:
+            return UNKNOWN
+        point = frame.geodetic_from_ned(north, east, 0.0 if height is None else height[0])
+        return (
+            math.degrees(point.latitude),
+            math.degrees(point.longitude),
+            None if height is None else point.altitude,
+        )
+
+    @staticmethod
+    def _slow_states(moments: Moments) -> dict[str, tuple[float, float]]:
+        return {
+            name: (float(moments.mean[i]), math.sqrt(max(0.0, float(moments.variance[i]))))
+            for i, name in enumerate(moments.names)
+            if name not in ("north", "east", "heading")
+        }

@@ -1,0 +1,156 @@
+"""The vehicle as the estimator sees it: its motion model with its controls, and the height that a plane leaves out.
+
+A ground vehicle's belief is planar. Its height is a state of its own, a random walk in a Kalman filter of one
+dimension, corrected by whatever fix brings an altitude; ranges need it, and it comes out with an honest variance.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from drivers.sample import AnyReading, GeodeticPosition, LocalPosition
+from filters.belief import Displacement
+from filters.kalman import KalmanFilter
+from filters.motion.prediction import IntervalNoise
+from filters.motion.slow import RandomWalk
+from filters.motion.unicycle import Unicycle, UnicycleControl
+from filters.particle import ParticleFilter
+from service.config import Configuration
+from service.estimator.controls import SECOND, Controls
+from service.estimator.start import Anchor
+from service.geodesy import LocalFrame
+
+UNKNOWN_SPEED = 2.0
+"""m/s; how fast a vehicle may move while its odometry is silent (one standard deviation)."""
+
+UNKNOWN_YAW_RATE = 0.5
+"""rad/s; the same for a silent gyro."""
+
+CLIMB = 0.05
+"""m per √s; how fast the height wanders, uncorrected."""
+
+SENSOR_WALK = 1e-4
+"""Per √s; how fast a sensor's scale or bias wanders."""
+
+CHORDS = 8
+"""Into how many chords the way from the horizon to now is cut."""
+
+
+class Vehicle:
+    """Motion model, controls and height of the vehicle of a configuration.
+
+    Attributes
+    ----------
+    motion : Unicycle
+        What moves the particles.
+    controls : Controls
+        What was rolled and turned, and when.
+    slow_states : list[RandomWalk]
+        Slow states that the sensors ask for.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        settings = configuration.motion
+        self.motion = Unicycle(
+            settings.speed_noise,
+            settings.yaw_rate_noise,
+            settings.gyro_bias_walk,
+            settings.odometry_scale_walk,
+            slip_noise=settings.slip_noise,
+            turn_noise=settings.turn_noise,
+        )
+        self.controls = Controls(
+            settings.wheel_radius, settings.wheel_track, settings.speed_from, settings.yaw_rate_from
+        )
+        self.slow_states = [
+            RandomWalk(f"{sensor.kind}_{state}", SENSOR_WALK)
+            for sensor in configuration.sensor
+            for state in sensor.estimate
+            if state != "delay"
+        ]
+        self._settings = settings
+        self._height: KalmanFilter | None = None
+
+    # --- on the plane -------------------------------------------------------------------------------------------
+
+    def predict(self, belief: ParticleFilter, start: int, end: int) -> None:
+        """Move the particles by what the controls say of ``start`` to ``end`` (nanoseconds)."""
+        duration = (end - start) / SECOND
+        distance, turn = self.controls.distance(start, end), self.controls.turn(start, end)
+        belief.predict(UnicycleControl(distance.total, turn.total), duration)
+        if self._height is not None:
+            self._height.predict(np.eye(1), np.array([[CLIMB**2 * duration]]))
+
+    def displacement(self, start: int, end: int, biases: tuple[float, float]) -> Displacement:
+        """Return the body's rigid motion from ``start`` to ``end``, corrected by (gyro bias, odometry scale)."""
+        bias, scale = biases
+        forward = right = turn = 0.0
+        for chord in range(CHORDS):
+            since = start + (end - start) * chord // CHORDS
+            until = start + (end - start) * (chord + 1) // CHORDS
+            step = self.controls.turn(since, until).total - bias * (until - since) / SECOND
+            distance = scale * self.controls.distance(since, until).total
+            forward += distance * math.cos(turn + 0.5 * step)
+            right += distance * math.sin(turn + 0.5 * step)
+            turn += step
+        return Displacement(forward, right, turn)
+
+    def noise(self, start: int, end: int) -> IntervalNoise:
+        """Return the process noise of an interval, as the motion model has it."""
+        settings, duration = self._settings, (end - start) / SECOND
+        distance, turn = self.controls.distance(start, end), self.controls.turn(start, end)
+        along = settings.speed_noise**2 * duration + settings.slip_noise**2 * abs(distance.total)
+        heading = settings.yaw_rate_noise**2 * duration + settings.turn_noise**2 * abs(turn.total)
+        return IntervalNoise(
+            along + (UNKNOWN_SPEED * distance.unknown) ** 2,
+            heading + (UNKNOWN_YAW_RATE * turn.unknown) ** 2,
+        )
+
+    @property
+    def speed_noise(self) -> float:
+        """Standard deviation of the speed that is published, m/s."""
+        return self._settings.speed_noise
+
+    # --- height -------------------------------------------------------------------------------------------------
+
+    def stand_at(self, anchor: Anchor | None) -> None:
+        """Begin the height anew where ``anchor`` has it, if it does."""
+        self._height = None
+        if anchor is not None and anchor.position[2] is not None:
+            self._height = KalmanFilter(np.array([anchor.position[2]]), np.array([[anchor.sigma[2] ** 2]]))
+
+    @property
+    def height(self) -> tuple[float, float] | None:
+        """Down (m) and its variance (m²), or ``None`` while unknown."""
+        if self._height is None:
+            return None
+        return float(self._height.mean[0]), float(self._height.covariance[0, 0])
+
+    @property
+    def down(self) -> float:
+        """Down, or the origin's own height while unknown."""
+        height = self.height
+        return 0.0 if height is None else height[0]
+
+    def level(self, reading: AnyReading, frame: LocalFrame | None) -> None:
+        """Correct the height by a position that brings one."""
+        measured = _down_of(reading, frame)
+        if measured is None:
+            return
+        down, sigma = measured
+        if self._height is None:
+            self._height = KalmanFilter(np.array([down]), np.array([[sigma**2]]))
+        else:
+            self._height.correct(np.array([down]), np.eye(1), np.array([[sigma**2]]))
+
+
+def _down_of(reading: AnyReading, frame: LocalFrame | None) -> tuple[float, float] | None:
+    """Return the down and its sigma that a position reading says, or ``None``."""
+    if isinstance(reading, GeodeticPosition) and reading.altitude is not None and frame is not None:
+        sigma = reading.sigma_vertical or 2.0 * (reading.sigma_horizontal or 3.0)
+        return frame.origin.altitude - reading.altitude, sigma
+    if isinstance(reading, LocalPosition) and reading.down is not None:
+        return reading.down, reading.sigma_vertical or 2.0 * (reading.sigma_horizontal or 1.0)
+    return None

@@ -1,0 +1,131 @@
+"""What the belief is worth, as one word and a reason.
+
+The states are defined once, here and in the table of ``docs/operating.md``. None of them is read off normalised
+weights: those always look the same, however wrong the belief is. What counts is whether absolute measurements arrive,
+whether they agree with what was expected (the unnormalised evidence), and how wide the published region is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from service.estimate import HealthState
+
+SECOND = 1_000_000_000
+CONVERGED_RADIUS = 10.0
+"""Metres of ``radius95`` below which a belief that had no place yet has one."""
+
+LOST_RADIUS = 4 * CONVERGED_RADIUS
+"""Metres of ``radius95`` above which a belief that had a place has it no longer, while measurements do arrive."""
+
+SILENCE = 3 * SECOND
+"""Without an absolute measurement for this long, the belief lives on odometry alone."""
+
+DISAGREEMENT = 0.8
+"""Share of surprising measurements above which the belief is taken to be wrong, not the sensors."""
+
+MEMORY = 3.0
+"""Seconds over which that share is averaged."""
+
+LEAST_READINGS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What health is judged by, at one tick.
+
+    Attributes
+    ----------
+    missing : list[str]
+        What has never been heard, in the user's words; the belief waits for it when it is not ``started``.
+    radius95 : float or None
+        Metres.
+    afforded, minimum : int
+        Particles that the budget allows, and the fewest that make a filter.
+    """
+
+    now: int
+    started: bool
+    missing: list[str]
+    radius95: float | None
+    afforded: int
+    minimum: int
+
+
+@dataclass(slots=True)
+class HealthMonitor:
+    """Follows the belief's fortunes from tick to tick.
+
+    Attributes
+    ----------
+    state, reason : HealthState, str
+        The verdict of the last :meth:`judge`.
+    """
+
+    state: HealthState = HealthState.WAITING
+    reason: str = "starting"
+    _surprise: float = 0.0
+    _readings: int = 0
+    _last_reading: int | None = None
+    _last_kind: str = ""
+    _placed: bool = field(default=False)
+
+    def measured(self, now: int, kind: str, surprise: float) -> None:
+        """Note one absolute measurement: ``surprise`` is the probability, 0…1, that it is the outlier part's."""
+        if self._last_reading is not None:
+            elapsed = max(0.0, (now - self._last_reading) / SECOND)
+            share = min(1.0, elapsed / MEMORY + 0.02)
+            self._surprise += share * (surprise - self._surprise)
+        self._readings += 1
+        self._last_reading = now
+        self._last_kind = kind
+
+    def restart(self) -> None:
+        """Forget the past: the belief was started anew."""
+        self._surprise = 0.0
+        self._readings = 0
+        self._last_reading = None
+        self._placed = False
+
+    def judge(self, facts: Facts) -> HealthState:
+        """Return the state at this tick and keep it with its reason."""
+        self.state, self.reason = self._verdict(facts)
+        return self.state
+
+    def _verdict(self, facts: Facts) -> tuple[HealthState, str]:
+        if not facts.started or facts.radius95 is None:
+            return HealthState.WAITING, "no data yet: " + ", ".join(facts.missing)
+        radius = facts.radius95
+        if facts.afforded < facts.minimum:
+            return (
+                HealthState.STARVED,
+                f"the budget affords {facts.afforded} particles, fewer than particles_min = {facts.minimum}",
+            )
+        silent = self._silence(facts)
+        if silent is not None:
+            return HealthState.DEAD_RECKONING, silent
+        if self._readings >= LEAST_READINGS and self._surprise > DISAGREEMENT:
+            return (
+                HealthState.LOST,
+                f"{self._surprise:.0%} of the measurements of the last {MEMORY:.0f} s disagree with the belief",
+            )
+        return self._by_spread(radius)
+
+    def _silence(self, facts: Facts) -> str | None:
+        missing = f"; never heard: {', '.join(facts.missing)}" if facts.missing else ""
+        if self._last_reading is None:
+            return f"no absolute measurement yet{missing}"
+        age = facts.now - self._last_reading
+        if age > SILENCE:
+            return (
+                f"no absolute measurement for {age / SECOND:.0f} s, the last was {self._last_kind}{missing}"
+            )
+        return None
+
+    def _by_spread(self, radius: float) -> tuple[HealthState, str]:
+        if self._placed and radius > LOST_RADIUS:
+            self._placed = False
+        if not self._placed and radius > CONVERGED_RADIUS:
+            return HealthState.CONVERGING, f"95 % within {radius:.1f} m, above {CONVERGED_RADIUS:.0f} m"
+        self._placed = True
+        return HealthState.TRACKING, "measurements agree with the belief"

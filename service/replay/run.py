@@ -1,0 +1,231 @@
+"""One replay: logs through the estimator, faster than real time, with what came out of it.
+
+The clock of a replay is the log's own receive clock. A tick sees exactly what had been received by then, so the
+estimates are the ones that the daemon would have published, had it been there with this many particles affordable.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from drivers.logs import LogReader
+from drivers.sample import LinkReport, Sample
+from service.config import Configuration
+from service.estimate import Estimate, HealthState
+from service.estimator import Estimator
+from service.replay.rows import EstimateFile
+from service.replay.sources import LogError, merged, open_log
+from service.score import UNSCORED, Score, Track, Truth, score
+
+SECOND = 1_000_000_000
+SILENCE_LIMIT = 600 * SECOND
+"""A log with a hole longer than this was spliced; ticks are not made up through it."""
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to replay and how.
+
+    Attributes
+    ----------
+    logs : tuple[Path, ...]
+        Merged by receive time.
+    particles : int
+        How many particles every tick affords; a replay has no deadline, so this stands for the machine.
+    out : Path or None
+        Folder for ``estimates_seedN.csv``.
+    """
+
+    logs: tuple[Path, ...]
+    configuration: Configuration
+    particles: int
+    truth: Truth | None = None
+    out: Path | None = None
+
+
+@dataclass
+class Run:
+    """What one seed gave; :meth:`row` is its object in ``--json``."""
+
+    seed: int
+    score: Score
+    particles_mean: float
+    late_samples: int
+    dropped: int
+    health: dict[str, float]
+    seconds: float
+    real_time_factor: float
+    ticks: int
+    biases: dict[str, tuple[float, float]]
+    sensors: dict[str, tuple[int, dict[str, int]]]
+    links: list[LinkReport]
+    last_reason: str = ""
+
+    def row(self) -> dict[str, object]:
+        """Return the figures as ``--json`` prints them."""
+        return {
+            "seed": self.seed,
+            **self.score.rounded(),
+            "particles_mean": round(self.particles_mean, 1),
+            "late_samples": self.late_samples,
+            "dropped": self.dropped,
+            "health": self.health,
+            "seconds": round(self.seconds, 3),
+            "real_time_factor": round(self.real_time_factor, 1),
+            "ticks": self.ticks,
+            "biases": {name: [round(v, 6), round(s, 6)] for name, (v, s) in self.biases.items()},
+            "sensors": {
+                name: {"accepted": accepted, "refused": refused}
+                for name, (accepted, refused) in self.sensors.items()
+            },
+            "links": [msgspec.to_builtins(report) for report in self.links],
+        }
+
+
+@dataclass
+class _Tally:
+    """Collects what a run's summary needs, tick by tick."""
+
+    time: list[float] = field(default_factory=list[float])
+    north: list[float] = field(default_factory=list[float])
+    east: list[float] = field(default_factory=list[float])
+    covariance: list[tuple[float, float, float]] = field(default_factory=list[tuple[float, float, float]])
+    health: Counter[HealthState] = field(default_factory=Counter[HealthState])
+    particles: int = 0
+    last: Estimate | None = None
+
+    def add(self, estimate: Estimate) -> None:
+        self.last = estimate
+        self.health[estimate.health] += 1
+        self.particles += estimate.particles
+        north, east, _ = estimate.position
+        nn, ne, _, ee, _, _ = estimate.position_covariance
+        if north is not None and east is not None and None not in (nn, ne, ee):
+            self.time.append(estimate.time)
+            self.north.append(north)
+            self.east.append(east)
+            self.covariance.append((nn or 0.0, ne or 0.0, ee or 0.0))
+
+    @property
+    def ticks(self) -> int:
+        return sum(self.health.values())
+
+    def track(self) -> Track:
+        return Track(
+            np.asarray(self.time),
+            np.asarray(self.north),
+            np.asarray(self.east),
+            np.asarray(self.covariance, np.float64).reshape(-1, 3),
+        )
+
+
+def ticks_of(samples: Iterator[Sample], rate: float) -> Iterator[tuple[int, list[Sample]]]:
+    """Cut a stream of samples into ticks: each with its time and what was received since the one before."""
+    first = next(samples, None)
+    if first is None:
+        return
+    start, index, batch = first.received, 0, [first]
+    deadline = start
+    for sample in samples:
+        while sample.received > deadline:
+            yield deadline, batch
+            batch = []
+            index += 1
+            deadline = start + round(index * SECOND / rate)
+            if sample.received - deadline > SILENCE_LIMIT:
+                start, index, deadline = sample.received, 0, sample.received
+        batch.append(sample)
+    yield deadline, batch
+
+
+def replay(plan: Plan, seed: int, progress: Progress = lambda share: None) -> Run:
+    """Replay ``plan`` once with ``seed``.
+
+    Raises
+    ------
+    LogError
+        A log cannot be read, or holds no sample at all.
+    """
+    readers = [open_log(path, plan.configuration) for path in plan.logs]
+    began = time.perf_counter()
+    estimator = Estimator(plan.configuration, seed=seed)
+    samples = merged(readers)
+    first = next(samples, None)
+    if first is None:
+        raise LogError(nothing_in(readers, plan.logs))
+    tally = _Tally()
+    with ExitStack() as stack:
+        file = None
+        if plan.out is not None:
+            file = stack.enter_context(EstimateFile(plan.out / f"estimates_seed{seed}.csv"))
+        now = first.received
+        for now, batch in ticks_of(chain([first], samples), plan.configuration.loop.rate):
+            estimator.ingest(batch)
+            estimate = estimator.tick(now, now, plan.particles)
+            tally.add(estimate)
+            if file is not None:
+                file.write(estimate, now)
+            if tally.ticks % 256 == 0:
+                progress(_share(readers))
+    seconds = time.perf_counter() - began
+    progress(1.0)
+    return _run(seed, plan, estimator, tally, readers, seconds, now)
+
+
+def _run(
+    seed: int,
+    plan: Plan,
+    estimator: Estimator,
+    tally: _Tally,
+    readers: list[LogReader],
+    seconds: float,
+    now: int,
+) -> Run:
+    drops = estimator.drops
+    late = drops.pop("late", 0)
+    last = tally.last
+    return Run(
+        seed=seed,
+        score=score(tally.track(), plan.truth) if plan.truth is not None else UNSCORED,
+        particles_mean=tally.particles / max(1, tally.ticks),
+        late_samples=late,
+        dropped=sum(drops.values()),
+        health={state.value: round(n / tally.ticks, 4) for state, n in sorted(tally.health.items())},
+        seconds=seconds,
+        real_time_factor=tally.ticks / plan.configuration.loop.rate / max(seconds, 1e-9),
+        ticks=tally.ticks,
+        biases=dict(last.biases) if last else {},
+        sensors={s.name: (s.accepted, s.refused) for s in estimator.sensors(now)},
+        links=[reader.report() for reader in readers],
+        last_reason=last.reason if last else "",
+    )
+
+
+def _share(readers: list[LogReader]) -> float:
+    size = sum(reader.size for reader in readers)
+    return sum(reader.position for reader in readers) / max(1, size)
+
+
+def nothing_in(readers: list[LogReader], logs: tuple[Path, ...]) -> str:
+    """Return why no sample came out of ``logs``, from what their readers counted."""
+    said: list[str] = []
+    for path, reader in zip(logs, readers, strict=True):
+        report = reader.report()
+        lost = ", ".join(f"{count} {kind}" for kind, count in report.malformed.items())
+        said.append(
+            f"{path}: no usable sample in it ({report.messages} messages read, {report.ignored} not wanted"
+            + (f"; refused: {lost}" if lost else "")
+            + ")"
+        )
+    return "; ".join(said)

@@ -1,0 +1,73 @@
+"""Many seeds of one replay, side by side in processes, with their progress and their spread."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import statistics
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, wait
+from multiprocessing.queues import SimpleQueue
+
+from service.replay.run import Plan, Run, replay
+
+Report = Callable[[int, float], None]
+"""Called with a seed and the share of its log that is done."""
+
+_progress: SimpleQueue[tuple[int, float]] | None = None
+
+
+def _begin(queue: SimpleQueue[tuple[int, float]]) -> None:
+    global _progress  # noqa: PLW0603  a pool hands its workers nothing else
+    _progress = queue
+
+
+def _work(plan: Plan, seed: int) -> Run:
+    queue = _progress
+    return replay(
+        plan, seed, (lambda share: None) if queue is None else lambda share: queue.put((seed, share))
+    )
+
+
+def replay_seeds(plan: Plan, seeds: list[int], report: Report, processes: int | None = None) -> list[Run]:
+    """Replay ``plan`` once per seed and return the runs in the order of the seeds.
+
+    One seed runs here; several run in a pool of ``processes`` (default: one per processor).
+    """
+    if len(seeds) == 1:
+        return [replay(plan, seeds[0], lambda share: report(seeds[0], share))]
+    context = multiprocessing.get_context("spawn")
+    queue: SimpleQueue[tuple[int, float]] = context.SimpleQueue()
+    workers = min(len(seeds), processes or os.cpu_count() or 1)
+    with ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(queue,)) as pool:
+        futures = {pool.submit(_work, plan, seed): seed for seed in seeds}
+        pending = set(futures)
+        while pending:
+            done, pending = wait(pending, timeout=0.1)
+            while not queue.empty():
+                report(*queue.get())
+            for future in done:
+                future.result()
+                report(futures[future], 1.0)
+        return [future.result() for future in sorted(futures, key=lambda f: futures[f])]
+
+
+SUMMARISED = ("rmse_m", "mean_m", "p95_m", "max_m", "coverage_95", "nees_mean", "final_m", "particles_mean")
+
+
+def summary(runs: list[Run]) -> dict[str, object]:
+    """Return mean, standard deviation, least and greatest over the seeds of every figure, and the health shares."""
+    rows = [run.row() for run in runs]
+    spread: dict[str, object] = {"seeds": len(runs)}
+    for name in SUMMARISED:
+        values = [float(value) for row in rows if isinstance(value := row[name], int | float)]
+        if values:
+            spread[name] = {
+                "mean": round(statistics.fmean(values), 4),
+                "sd": round(statistics.stdev(values), 4) if len(values) > 1 else 0.0,
+                "min": round(min(values), 4),
+                "max": round(max(values), 4),
+            }
+    states = sorted({state for run in runs for state in run.health})
+    spread["health"] = {s: round(statistics.fmean(run.health.get(s, 0.0) for run in runs), 4) for s in states}
+    return spread

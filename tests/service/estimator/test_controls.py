@@ -1,0 +1,185 @@
+"""Controls as totals over time: interpolated, held for a while, honest about gaps; one speaker at a time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.sample import (
+    AnyReading,
+    Attitude,
+    Inertial,
+    MotionCommand,
+    MotorSpeed,
+    Odometer,
+    Pressure,
+    Rotation,
+    Sample,
+    Speed,
+)
+from service.estimator.controls import GAP, SECOND, SILENCE, Controls, RateTrack, TotalTrack
+
+MS = 1_000_000
+
+
+def sample(time: int, reading: AnyReading, source: str = "S", link: str = "l") -> Sample:
+    return Sample(time, time, link, source, reading)
+
+
+def imu(time: int, rate: float, source: str = "HIGHRES_IMU") -> Sample:
+    return sample(time, Inertial(angular_velocity=(0.0, 0.0, rate)), source)
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 200), st.floats(-2, 2)), min_size=2, max_size=30),
+    st.floats(0, 1),
+    st.floats(0, 1),
+)
+def test_totals_interpolate_as_numpy_does(steps: list[tuple[int, float]], a: float, b: float) -> None:
+    track = TotalTrack()
+    times = np.cumsum([ms for ms, _ in steps]) * MS
+    totals = np.cumsum([step for _, step in steps])
+    for time, total in zip(times, totals, strict=True):
+        assert track.append(int(time), (float(total),), 0)
+    start, end = sorted(int(times[0] + share * (times[-1] - times[0])) for share in (a, b))
+    expected = np.interp(end, times, totals) - np.interp(start, times, totals)
+    motion = track.between(start, end)
+    assert motion.total == pytest.approx(expected, abs=1e-9)
+    assert motion.unknown == 0.0
+
+
+def test_rates_integrate_by_the_trapezoidal_rule() -> None:
+    track = RateTrack()
+    for k in range(101):
+        track.append(k * 10 * MS, 2.0 * k / 100)
+    assert track.between(0, SECOND).total == pytest.approx(1.0)
+
+
+def test_a_rate_is_held_for_a_while_and_then_unknown() -> None:
+    track = RateTrack()
+    for k in range(11):
+        track.append(k * 100 * MS, 3.0)
+    held = track.between(SECOND, SECOND + GAP)
+    assert held.total == pytest.approx(3.0 * GAP / SECOND)
+    assert held.unknown == 0.0
+    beyond = track.between(SECOND, SECOND + GAP + 2 * SECOND)
+    assert beyond.total == pytest.approx(3.0 * GAP / SECOND)
+    assert beyond.unknown == pytest.approx(2.0)
+
+
+def test_a_gap_between_rates_is_unknown_beyond_its_hold() -> None:
+    track = RateTrack()
+    track.append(0, 1.0)
+    track.append(3 * SECOND, 1.0)
+    motion = track.between(0, 3 * SECOND)
+    assert motion.total == pytest.approx(GAP / SECOND)
+    assert motion.unknown == pytest.approx(3.0 - GAP / SECOND)
+
+
+def test_a_counter_that_restarts_loses_only_what_it_missed() -> None:
+    track = TotalTrack()
+    track.append(0, (100.0,), 0)
+    track.append(SECOND, (101.0,), 0)
+    track.append(2 * SECOND, (0.0,), 1)
+    track.append(3 * SECOND, (1.5,), 1)
+    motion = track.between(0, 3 * SECOND)
+    assert motion.total == pytest.approx(2.5)
+    assert motion.unknown == pytest.approx(1.0)
+
+
+def test_a_track_that_never_heard_anything_knows_nothing() -> None:
+    motion = RateTrack().between(SECOND, 3 * SECOND)
+    assert motion.total == 0.0
+    assert motion.unknown == pytest.approx(2.0)
+
+
+def test_time_running_backwards_is_refused_and_counted() -> None:
+    controls = Controls()
+    controls.take(imu(2 * SECOND, 0.1))
+    controls.take(imu(SECOND, 0.1))
+    assert controls.out_of_order == 1
+
+
+def test_three_messages_about_one_gyro_count_once() -> None:
+    controls = Controls()
+    for k in range(100):
+        time = k * 10 * MS
+        controls.take(imu(time, 0.5, "RAW_IMU"))
+        controls.take(imu(time + 1, 0.5, "HIGHRES_IMU"))
+        controls.take(imu(time + 2, 0.5, "SCALED_IMU2"))
+        controls.take(sample(time + 3, Attitude(0, 0, 0, (0, 0, 0.5)), "ATTITUDE"))
+    assert controls.sources[1] == "HIGHRES_IMU"
+    assert controls.turn(0, 990 * MS).total == pytest.approx(0.495, rel=0.02)
+
+
+def test_the_next_speaker_takes_over_after_a_silence_and_gives_back() -> None:
+    controls = Controls()
+    controls.take(imu(0, 0.1, "HIGHRES_IMU"))
+    controls.take(imu(SILENCE // 2, 0.2, "RAW_IMU"))
+    assert controls.sources[1] == "HIGHRES_IMU"
+    controls.take(imu(2 * SILENCE, 0.2, "RAW_IMU"))
+    assert controls.sources[1] == "RAW_IMU"
+    controls.take(imu(2 * SILENCE + MS, 0.1, "HIGHRES_IMU"))
+    assert controls.sources[1] == "HIGHRES_IMU"
+
+
+def test_a_configured_source_is_the_only_one_heard() -> None:
+    controls = Controls(yaw_rate_from="RAW_IMU")
+    controls.take(imu(0, 9.0, "HIGHRES_IMU"))
+    assert controls.sources[1] is None
+    controls.take(imu(1, 0.1, "RAW_IMU"))
+    assert controls.sources[1] == "RAW_IMU"
+
+
+def test_two_wheels_and_a_track_make_a_yaw_rate() -> None:
+    """Left 0.5 m/s faster than right over a track of 0.5 m: one rad/s, clockwise."""
+    controls = Controls(wheel_track=0.5)
+    for k in range(21):
+        t = k * 50 * MS
+        controls.take(sample(t, Odometer((1.5 * t / SECOND, 1.0 * t / SECOND)), "WHEEL_DISTANCE"))
+    assert controls.turn(100 * MS, 900 * MS).total == pytest.approx(0.8)
+    assert controls.distance(100 * MS, 900 * MS).total == pytest.approx(1.0)
+
+
+def test_motors_need_a_wheel_radius() -> None:
+    without, with_radius = Controls(), Controls(wheel_radius=0.1)
+    for controls in (without, with_radius):
+        for k in range(11):
+            controls.take(sample(k * 100 * MS, MotorSpeed(0, 20.0), "esc.Status"))
+    assert without.sources[0] is None
+    assert with_radius.distance(0, SECOND).total == pytest.approx(2.0)
+
+
+def test_commands_speak_only_when_nothing_measures() -> None:
+    controls = Controls()
+    for k in range(20):
+        controls.take(
+            sample(
+                k * 100 * MS,
+                MotionCommand(velocity=(3.0, 4.0, 0.0), yaw_rate=0.1),
+                "POSITION_TARGET_LOCAL_NED",
+            )
+        )
+    assert controls.speed(SECOND) == pytest.approx(5.0)
+    assert controls.yaw_rate(SECOND) == pytest.approx(0.1)
+    controls.take(sample(2 * SECOND, Speed(1.0), "sample/dvl"))
+    controls.take(sample(2 * SECOND, Rotation(0.2), "sample/gyro"))
+    assert controls.sources == ("sample/dvl", "sample/gyro")
+
+
+def test_what_is_no_control_is_left_to_others() -> None:
+    assert not Controls().take(sample(0, Pressure(101325.0)))
+
+
+def test_memory_is_bounded() -> None:
+    controls = Controls()
+    for k in range(20_000):
+        controls.take(imu(k * 10 * MS, 0.01))
+        controls.forget(k * 10 * MS - SECOND)
+    turn = controls.turn(20_000 * 10 * MS - SECOND, 19_999 * 10 * MS)
+    assert math.isclose(turn.total, 0.0099, rel_tol=0.02)
+    assert len(controls._turn._times) < 400  # noqa: SLF001

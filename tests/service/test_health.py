@@ -1,0 +1,89 @@
+"""Every state of health that the daemon can reach is entered and left here, with its reason."""
+
+from __future__ import annotations
+
+from service.estimate import HealthState
+from service.health import CONVERGED_RADIUS, LOST_RADIUS, SILENCE, Facts, HealthMonitor
+
+SECOND = 1_000_000_000
+
+
+def facts(
+    now: float, radius: float | None = 1.0, *, started: bool = True, missing: list[str] | None = None, afforded: int = 5000
+) -> Facts:
+    return Facts(round(now * SECOND), started, missing or [], radius, afforded, 200)
+
+
+def agreeing(monitor: HealthMonitor, start: float, seconds: float, surprise: float = 0.02) -> float:
+    """Feed ten measurements a second for a while; return the time after the last."""
+    steps = round(seconds * 10)
+    for k in range(steps):
+        monitor.measured(round((start + k / 10) * SECOND), "range/a/1", surprise)
+    return start + steps / 10
+
+
+def test_waits_for_data_and_says_for_what() -> None:
+    monitor = HealthMonitor()
+    assert monitor.judge(facts(0, None, started=False, missing=["odometry", "range/a"])) is HealthState.WAITING
+    assert "odometry" in monitor.reason
+    assert "range/a" in monitor.reason
+
+
+def test_converges_then_tracks() -> None:
+    monitor = HealthMonitor()
+    now = agreeing(monitor, 0, 2)
+    assert monitor.judge(facts(now, 2 * CONVERGED_RADIUS)) is HealthState.CONVERGING
+    assert monitor.judge(facts(now, 0.5 * CONVERGED_RADIUS)) is HealthState.TRACKING
+    assert monitor.judge(facts(now, 2 * CONVERGED_RADIUS)) is HealthState.TRACKING
+    assert monitor.judge(facts(now, 2 * LOST_RADIUS)) is HealthState.CONVERGING
+
+
+def test_dead_reckons_without_absolute_measurements() -> None:
+    monitor = HealthMonitor()
+    assert monitor.judge(facts(0)) is HealthState.DEAD_RECKONING
+    now = agreeing(monitor, 1, 2)
+    assert monitor.judge(facts(now)) is HealthState.TRACKING
+    later = now + SILENCE / SECOND + 0.2
+    assert monitor.judge(facts(later)) is HealthState.DEAD_RECKONING
+    assert "range/a/1" in monitor.reason
+    monitor.measured(round(later * SECOND), "range/a/1", 0.02)
+    assert monitor.judge(facts(later)) is HealthState.TRACKING
+
+
+def test_is_lost_when_the_measurements_disagree_and_found_when_they_agree() -> None:
+    monitor = HealthMonitor()
+    now = agreeing(monitor, 0, 3)
+    now = agreeing(monitor, now, 8, surprise=0.99)
+    assert monitor.judge(facts(now)) is HealthState.LOST
+    assert "disagree" in monitor.reason
+    now = agreeing(monitor, now, 8)
+    assert monitor.judge(facts(now)) is HealthState.TRACKING
+
+
+def test_a_single_outlier_changes_nothing() -> None:
+    monitor = HealthMonitor()
+    now = agreeing(monitor, 0, 5)
+    monitor.measured(round(now * SECOND), "range/a/1", 1.0)
+    assert monitor.judge(facts(now)) is HealthState.TRACKING
+
+
+def test_a_few_readings_do_not_make_it_lost() -> None:
+    monitor = HealthMonitor()
+    for k in range(5):
+        monitor.measured(k * SECOND, "range/a/1", 1.0)
+    assert monitor.judge(facts(4.1)) is HealthState.TRACKING
+
+
+def test_starves_when_the_budget_affords_too_few() -> None:
+    monitor = HealthMonitor()
+    now = agreeing(monitor, 0, 2)
+    assert monitor.judge(facts(now, afforded=100)) is HealthState.STARVED
+    assert "100 particles" in monitor.reason
+    assert monitor.judge(facts(now)) is HealthState.TRACKING
+
+
+def test_a_restart_forgets() -> None:
+    monitor = HealthMonitor()
+    agreeing(monitor, 0, 8, surprise=1.0)
+    monitor.restart()
+    assert monitor.judge(facts(9)) is HealthState.DEAD_RECKONING
