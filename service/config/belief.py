@@ -154,7 +154,7 @@ class Sensor(Section):
     outliers: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=1)] = 0.05
     """Share of readings that mean nothing."""
     estimate: tuple[SlowState, ...] = ()
-    """Slow states to estimate with the pose: scale, bias, delay."""
+    """Slow states to estimate with the pose, of ranges: scale, bias, delay."""
     delay_ms: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=10_000)] = 0.0
     """Known latency before the stamp, ms (ArduPilot SITL GPS: 90)."""
     scale_sigma: NotNegative = 0.05

@@ -16,24 +16,22 @@ from service.config.section import shown
 
 Table = Mapping[str, Any]
 
-# What the file may name already and this version does not do yet; the words say what it does.
+# What the file may say already and this version does not do yet; the words say what it does.
 NOT_BUILT: dict[tuple[str, str], tuple[frozenset[object], str]] = {
     ("vehicle", "motion"): (frozenset({"constant_velocity", "drift", "inertial"}), "unicycle"),
     ("sensor", "kind"): (
-        frozenset({"bearing", "range_bearing", "altitude", "terrain", "scan"}),
-        "position, velocity, range, heading, speed",
+        frozenset({"bearing", "range_bearing", "altitude", "terrain", "scan", "speed"}),
+        "position, velocity, range, heading",
     ),
+    ("sensor", "estimate"): (frozenset({"delay"}), "scale, bias"),
     ("link", "send"): (frozenset({"odometry", "gps_input", "global_position_sensor"}), "none"),
+    ("link", "protocol"): (frozenset({"dbc"}), "dronecan"),
 }
+NOT_READ = (("map", "terrain"), ("map", "occupancy"), ("map", "landmarks"), ("publish", "ros2_domain"))
+_NOTHING: tuple[object, ...] = ("", -1)
 
-FILES = (
-    ("link", "signing_key_file"),
-    ("link", "dbc"),
-    ("map", "terrain"),
-    ("map", "occupancy"),
-    ("map", "landmarks"),
-)
-FILES_OF_PUBLISH = (("publish", "zenoh"),)
+FILES = (("link", "signing_key_file"), ("publish", "zenoh"))
+"""Keys that name files; relative ones are relative to the configuration's folder."""
 
 
 def table(raw: Table, name: str) -> Table:
@@ -106,14 +104,27 @@ def _not_built(raw: Table) -> Iterator[str]:
     for (name, key), (planned, built) in NOT_BUILT.items():
         for place, entry in entries(raw, name):
             value = entry.get(key)
-            if isinstance(value, str) and value in planned:
-                where = place_in_words((*place, key), raw)
-                yield f"{where}: {shown(value)} is not in this version, which has: {built}"
+            for one in cast("list[object]", value) if isinstance(value, list) else [value]:
+                if isinstance(one, str) and one in planned:
+                    where = place_in_words((*place, key), raw)
+                    yield f"{where}: {shown(one)} is not in this version, which has: {built}"
+    for name, key in NOT_READ:
+        value = table(raw, name).get(key, "")
+        if isinstance(value, str | int) and value not in _NOTHING:
+            yield f"{name}, {key}: is not in this version; leave it out"
+
+
+def _slow_states_of_ranges(raw: Table) -> Iterator[str]:
+    for place, sensor in entries(raw, "sensor"):
+        kind, wanted = sensor.get("kind"), sensor.get("estimate")
+        if kind != "range" and isinstance(kind, str) and isinstance(wanted, list) and wanted:
+            where = place_in_words((*place, "estimate"), raw)
+            yield f"{where}: scale and bias are estimated for ranges only, and this is {shown(kind)}"
 
 
 def resolved(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return the file's content with the paths it names taken relative to the file's folder."""
-    named = {key for _, key in (*FILES, *FILES_OF_PUBLISH)}
+    named = {key for _, key in FILES}
 
     def absolute(entry: Any) -> Any:
         if not isinstance(entry, dict):
@@ -125,7 +136,7 @@ def resolved(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
         }
 
     content = dict(raw)
-    for name in {name for name, _ in (*FILES, *FILES_OF_PUBLISH)}:
+    for name in {name for name, _ in FILES}:
         value = content.get(name)
         content[name] = (
             [absolute(entry) for entry in cast("list[Any]", value)] if isinstance(value, list) else value
@@ -138,7 +149,7 @@ def resolved(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _absent_files(raw: Table) -> Iterator[str]:
-    for name, key in (*FILES, *FILES_OF_PUBLISH):
+    for name, key in FILES:
         for place, entry in entries(raw, name):
             path = entry.get(key)
             if isinstance(path, str) and path and "\0" not in path and not Path(path).is_file():
@@ -155,5 +166,6 @@ def across_sections(raw: Table) -> list[str]:
         *_area_of_a_global_start(raw),
         *_budget_within_a_tick(raw),
         *_not_built(raw),
+        *_slow_states_of_ranges(raw),
         *_absent_files(raw),
     ]

@@ -26,11 +26,11 @@ class ServoCalibration(Section):
 
     channel: Annotated[Whole, Field(ge=1, le=32)]
     """Output as SERVO_OUTPUT_RAW numbers it, from 1."""
-    low: Annotated[Whole, Field(ge=500, le=2500)] = 1000
+    low: Annotated[Whole, Field(ge=500, le=2500)] = 1100
     """Pulse at -1, µs."""
     trim: Annotated[Whole, Field(ge=500, le=2500)] = 1500
     """Pulse at 0, µs."""
-    high: Annotated[Whole, Field(ge=500, le=2500)] = 2000
+    high: Annotated[Whole, Field(ge=500, le=2500)] = 1900
     """Pulse at 1, µs."""
     reversed: Flag = False
     """The channel turns the other way: the sign is changed."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
 from service.config import structure
-from service.config.checks import NOT_BUILT
+from service.config.checks import NOT_BUILT, NOT_READ
 from service.config.configuration import Configuration
 from service.config.section import Section
 
@@ -85,6 +85,8 @@ def _default(schema: Schema) -> str:
 def _planned(path: str, name: str) -> str:
     """Return which values of a key are accepted by the grammar and refused by this version."""
     values, _ = NOT_BUILT.get((path, name), (frozenset[object](), ""))
+    if (path, name) in NOT_READ:
+        return " Not in this version."
     return f" Not in this version: {', '.join(sorted(map(str, values)))}." if values else ""
 
 

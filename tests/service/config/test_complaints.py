@@ -97,7 +97,7 @@ SINGLE = [
         'link "bus" (link 2), options, fd: needs text, a number, true or false, got []',
     ),
     ("link.1.options", 5, 'link "bus" (link 2), options: needs a table, got 5'),
-    ("link.1.protocol", "dbc", 'link "bus" (link 2): protocol = "dbc" needs dbc (the file) and at least one'),
+    ("link.1.protocol", "cyphal", 'protocol: needs one of dronecan, dbc, got "cyphal"'),
     ("link.1.signal.0.scale", True, 'link "bus" (link 2), signal 1, scale: needs a number, got true'),
     ("link.1.signal.0.measures", "sped", 'altitude, got "sped"; did you mean "speed"?'),
     ("link.1.signal.0.signal", "SPEED", 'link "bus" (link 2), signal 1, signal: needs text of the form'),
@@ -105,7 +105,7 @@ SINGLE = [
     (
         "link.0.servo",
         [{"channel": 1, "low": 1600}],
-        "servo 1: needs low <= trim <= high, got 1600, 1500, 2000",
+        "servo 1: needs low <= trim <= high, got 1600, 1500, 1900",
     ),
     ("link.0.system", 256, 'link "autopilot" (link 1), system: needs at most 255, got 256'),
     ("link.0.signing_key_file", "/no/key", "signing_key_file: needs a file that exists, there is no /no/key"),
@@ -157,7 +157,15 @@ SINGLE = [
     ("sensor.0.beacons", [7, 8], "sensor 1 (range), beacons: no [[beacon]] with id 8"),
     ("publish.prefix", "a//b", "publish, prefix: needs text of the form"),
     ("publish.particles", 10**6, "publish, particles: needs at most 3000, got 1000000"),
-    ("map.terrain", "/no/tile.hgt", "map, terrain: needs a file that exists, there is no /no/tile.hgt"),
+    ("map.terrain", "tile.hgt", "map, terrain: is not in this version; leave it out"),
+    ("publish.ros2_domain", 0, "publish, ros2_domain: is not in this version; leave it out"),
+    ("publish.zenoh", "/no/z.json5", "publish, zenoh: needs a file that exists, there is no /no/z.json5"),
+    ("sensor.0.estimate", ["delay"], 'estimate: "delay" is not in this version, which has: scale, bias'),
+    (
+        "sensor",
+        [{"kind": "position", "estimate": ["bias"]}],
+        'sensor 1 (position), estimate: scale and bias are estimated for ranges only, and this is "position"',
+    ),
     ("moton", {}, 'moton: unknown key; did you mean "motion"?'),
     ("xyzzy", 1, "xyzzy: unknown key"),
 ]
@@ -205,3 +213,11 @@ def test_long_values_are_cut_to_one_line() -> None:
     (line,) = complaints(placed(whole(), "loop.rate", "x\n" * 400))
     assert len(line) < 120
     assert "\n" not in line
+
+
+def test_what_a_later_version_reads_is_checked_already() -> None:
+    assert complaints(placed(whole(), "link.1.protocol", "dbc")) == [
+        'robot.toml: link "bus" (link 2): protocol = "dbc" needs dbc (the file) and at least one '
+        "[[link.signal]]",
+        'robot.toml: link "bus" (link 2), protocol: "dbc" is not in this version, which has: dronecan',
+    ]

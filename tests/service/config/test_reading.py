@@ -76,12 +76,10 @@ def test_start_fills_in_its_mode_and_the_spread_of_the_heading(
 
 
 def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
-    (tmp_path / "car.dbc").write_text("")
-    can = '[[link]]\nname="bus"\nkind="can"\nchannel="can0"\nprotocol="dbc"\ndbc="car.dbc"\n'
-    signal = '[[link.signal]]\nsignal="SPEED.ENCODER"\nmeasures="speed"\n'
-    link = load(written(tmp_path, LEAST + can + signal)).link[1]
-    assert isinstance(link, CanLink)
-    assert link.dbc == str(tmp_path / "car.dbc")
+    (tmp_path / "signing.key").write_text("0" * 64)
+    link = load(written(tmp_path, LEAST + 'signing_key_file = "signing.key"\n')).link[0]
+    assert isinstance(link, MavlinkLink)
+    assert link.signing_key_file == str(tmp_path / "signing.key")
 
 
 def test_a_site_needs_neither_vehicle_nor_link(tmp_path: Path) -> None:
