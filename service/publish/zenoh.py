@@ -36,7 +36,7 @@ _CLOSING = 1.0
 
 
 def run(configuration: Configuration, estimates: socket.socket) -> None:
-    """Publish until SIGTERM, or until the supervisor has gone.
+    """Publish until SIGTERM.
 
     Parameters
     ----------
@@ -57,10 +57,8 @@ def run(configuration: Configuration, estimates: socket.socket) -> None:
         stop = True
 
     signal.signal(signal.SIGTERM, _stop)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the supervisor too, which then says stop
-    supervisor = os.getppid()
     publisher = Publisher(configuration, estimates, opener(configuration))
-    while not stop and os.getppid() == supervisor:
+    while not stop:
         publisher.step()
     if not publisher.close(_CLOSING):
         log.warning("the Zenoh session did not close within %g s: leaving without it", _CLOSING)
