@@ -51,5 +51,5 @@ def draw(name: str, seed: int) -> Scenario:
 
 def _entry(name: str) -> Entry:
     if name not in _ENTRIES:
-        raise ValueError(f"scenario {name!r}: there is none of this name; there are {', '.join(names())}")
+        raise ValueError(f"there is no scenario {name!r}; there are {', '.join(names())}")
     return _ENTRIES[name]

@@ -39,7 +39,7 @@ def draw(seed: int) -> Scenario:
             Cadence(25.0, phase=0.003, latency=0.002),
             earth=(horizontal * math.cos(_DECLINATION), horizontal * math.sin(_DECLINATION), 45.0e-6),
             noise=0.3e-6,
-            disturbance=math.radians(3.0),
+            disturbance=math.radians(1.5),
             disturbance_correlation=15.0,
         ),
         barometer=BarometerSettings(Cadence(10.0, phase=0.005, latency=0.005), noise=3.0, drift=10.0),
@@ -55,6 +55,13 @@ def draw(seed: int) -> Scenario:
             *beacons.draw(seed).facts,
             SensorFacts("position", "bus", sigma=round(gnss.sigma, 3), outliers=0.02, delay_ms=90.0),
             SensorFacts("velocity", "bus", sigma=gnss.velocity_noise, outliers=0.02, delay_ms=90.0),
-            SensorFacts("heading", "autopilot", sigma=0.06, outliers=0.02),
+            # The needle's error lasts for many readings: its sigma is told larger, as if they were independent.
+            SensorFacts(
+                "heading",
+                "autopilot",
+                sigma=0.1,
+                outliers=0.02,
+                declination_deg=round(math.degrees(_DECLINATION), 3),
+            ),
         ),
     )
