@@ -1,7 +1,8 @@
 """One process under supervision: started, listened to, ended, and started again with back-off.
 
-A child that has a heart must beat: within ``start_patience`` of its start (or of its last announcement), and from
-then on never further apart than ``patience``. One that has none is taken at its word as long as it lives.
+A child that has a heart must beat: within ``start_patience`` of its start (or of its last announcement), and
+from then on never further apart than ``patience``. One that has none is taken at its word as long as it
+lives.
 """
 
 from __future__ import annotations
@@ -62,8 +63,8 @@ class Program:
 class Child:
     """Follows one program through its lives.
 
-    ``state`` is ``starting`` until the first beat, ``running``, ``waiting`` (for the back-off to pass), ``stopping``
-    or ``stopped``. Times are seconds on the monotonic clock, given by the caller.
+    ``state`` is ``starting`` until the first beat, ``running``, ``waiting`` (for the back-off to pass),
+    ``stopping`` or ``stopped``. Times are seconds on the monotonic clock, given by the caller.
     """
 
     def __init__(self, program: Program) -> None:
@@ -79,6 +80,12 @@ class Child:
         self._back_off = BackOff()
         self._healthy_since: float | None = None
         self._again = True
+        self._accused = ""
+
+    @property
+    def leaving(self) -> bool:
+        """Whether nothing is to be started after it."""
+        return not self._again
 
     @property
     def alive(self) -> bool:
@@ -105,7 +112,7 @@ class Child:
             env=inherited | dict(program.environment),
             process_group=0,  # Ctrl-C in a terminal reaches the supervisor alone, which ends things in order
         )
-        self._again = True
+        self._accused = ""
         self._healthy_since = None if program.heart else now
         self.state = "starting" if program.heart else "running"
         self.due = now + program.start_patience if program.heart else float("inf")
@@ -137,7 +144,7 @@ class Child:
 
     def hung(self, now: float, why: str) -> None:
         """End it at once, because it no longer does its work."""
-        self.reason = why
+        self._accused = why
         self._signal(signal.SIGKILL)
         self.due = now + TERMINATION
 
@@ -153,6 +160,12 @@ class Child:
             self.state, self.due = "waiting", now
         else:
             self.state, self.due = "stopped", float("inf")
+
+    def could_not_start(self, now: float, why: str) -> None:
+        """Take note that there is not even a process; try again after the back-off."""
+        self.state, self.reason = "waiting", why
+        self.failed_starts += 1
+        self.due = now + self._back_off.failed(0.0)
 
     def kill(self) -> None:
         """End it for good, without asking."""
@@ -170,7 +183,7 @@ class Child:
             self.failed_starts += 1
         lived = 0.0 if self._healthy_since is None else now - self._healthy_since
         self.state = "waiting"
-        self.reason = self.reason or how
+        self.reason = self._accused or how
         self.restarts += 1
         self.due = now + self._back_off.failed(lived)
         return how
@@ -179,7 +192,12 @@ class Child:
         """Return what the service says about it."""
         pid = self.pid
         return ProcessStatus(
-            self.program.name, pid, self.state, self.restarts, self.reason, resident_bytes(pid) if pid else None
+            self.program.name,
+            pid,
+            self.state,
+            self.restarts,
+            self.reason,
+            resident_bytes(pid) if pid else None,
         )
 
     def _signal(self, number: signal.Signals) -> None:

@@ -46,19 +46,19 @@ class Estimator(Protocol):
         """Samples that were not used, by reason."""
         ...
 
-    def ingest(self, samples: Iterable[Sample]) -> None:
+    def ingest(self, samples: Iterable[Sample], /) -> None:
         """Take samples in."""
         ...
 
-    def tick(self, now_ns: int, unix_ns: int, afforded: int) -> Estimate:
+    def tick(self, now_ns: int, unix_ns: int, afforded: int, /) -> Estimate:
         """Bring the belief to now."""
         ...
 
-    def sensors(self, now_ns: int) -> list[SensorStatus]:
+    def sensors(self, now_ns: int, /) -> list[SensorStatus]:
         """Return every sensor as the belief sees it."""
         ...
 
-    def cloud(self, count: int) -> NDArray[np.float32]:
+    def cloud(self, count: int, /) -> NDArray[np.float32]:
         """Return at most ``count`` particles, shape (n, 4): north, east, heading, weight."""
         ...
 
@@ -233,6 +233,16 @@ class Loop:
         drops["publisher"] = self._outlet.dropped
         drops["undecodable"] = sum(inlet.undecodable for inlet in self._inlets)
         return drops | self._estimator.drops
+
+    def summary(self) -> str:
+        """Return the whole run in one line."""
+        lateness, duration = self._meters.lateness, self._meters.durations
+        return (
+            f"{self.ticks} ticks, {self.missed_ticks} missed, {self.overruns} over the budget; "
+            f"lateness median {1e3 * lateness.quantile(0.5):.2f}, 99 % {1e3 * lateness.quantile(0.99):.2f}, "
+            f"worst {1e3 * lateness.worst:.2f} ms; duration median {1e3 * duration.quantile(0.5):.2f}, "
+            f"99 % {1e3 * duration.quantile(0.99):.2f}, worst {1e3 * duration.worst:.2f} ms"
+        )
 
     def sensors(self, unix: float, now_ns: int) -> Sensors:
         """Return every sensor and every link."""

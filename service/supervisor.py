@@ -1,7 +1,7 @@
-"""The supervisor: the service's main process. It starts, watches, restarts, answers systemd, and stops; it does no
-other work.
+"""The supervisor: the service's main process, that starts, watches, restarts, answers systemd, and stops.
 
-One thread, one wait: for the end of a child (pidfd), for its beats, for a signal, or for the next thing that is due.
+It does no other work. One thread, one wait: for the end of a child (pidfd), for its beats, for a signal, or
+for the next thing that is due.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import selectors
 import signal
 import socket
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
+from pathlib import Path
 from typing import Protocol
 
 import msgspec
@@ -22,7 +23,9 @@ from service.channels import PROCESSES, Outlet
 from service.child import Child, Program, resident_bytes
 from service.config import ConfigurationError
 from service.estimate import ProcessStatus
+from service.journal import write_log
 from service.notify import Notifier
+from service.wiring import Wiring
 
 START_LIMIT = 5
 """Failed starts in a row of the vital process after which the service gives up."""
@@ -105,13 +108,12 @@ class Supervisor:
     # --- waiting --------------------------------------------------------------------------------
 
     @contextlib.contextmanager
-    def _signals(self) -> Iterator[None]:
+    def _signals(self) -> Generator[None]:
         reader, writer = socket.socketpair()
         reader.setblocking(False)
         writer.setblocking(False)
         handlers = {
-            number: signal.signal(number, lambda *_: None)
-            for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+            number: signal.signal(number, _noted) for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
         }
         before = signal.set_wakeup_fd(writer.fileno())
         self._selector.register(reader, selectors.EVENT_READ)
@@ -162,14 +164,12 @@ class Supervisor:
         programs = {program.name: program for program in self._plan.programs()}
         for name, child in self._children.items():
             if name not in programs:
-                self._forget_heart(child)
                 child.end(now, None)
         for name, program in programs.items():
             child = self._children.get(name)
             if child is None:
                 self._children[name] = Child(program)
-                self._watch_heart(self._children[name])
-            elif child.program.settings != program.settings:
+            elif child.leaving or child.program.settings != program.settings:
                 child.end(now, program)
             else:
                 child.program = program
@@ -179,10 +179,7 @@ class Supervisor:
         """Do what is due: start it, kill it when it would not end, or end it because it hangs."""
         name = child.program.name
         if child.state == "waiting":
-            self._selector.register(child.start(now), selectors.EVENT_READ, child)
-            if name == self._plan.publisher:
-                self._read = now
-                self._plan.call()
+            self._start(child, now)
         elif child.state == "stopping":
             _log.warning("%s: did not end within its time, killed", name)
             child.kill()
@@ -191,6 +188,24 @@ class Supervisor:
             _log.warning("%s: no sign of life for %g s, killed", name, patience)
             child.hung(now, f"hung: no sign of life for {patience:g} s")
         self._status_due = now
+
+    def _start(self, child: Child, now: float) -> None:
+        name = child.program.name
+        try:
+            descriptor = child.start(now)
+        except OSError as error:
+            child.could_not_start(now, f"cannot be started: {error}")
+            _log.error("%s: cannot be started: %s", name, error)
+            self._give_up_on(child)
+            return
+        self._selector.register(descriptor, selectors.EVENT_READ, child)
+        if child.program.heart is not None:
+            self._selector.register(child.program.heart, selectors.EVENT_READ, child)
+        if child.program.vital and self._notifier.watchdog_period:
+            self._notifier.watchdog_within(child.program.start_patience)
+        if name == self._plan.publisher:
+            self._read = now
+            self._plan.call()
 
     def _listen(self, child: Child) -> None:
         now = time.monotonic()
@@ -204,15 +219,22 @@ class Supervisor:
             self._status_due = now
             _log.info("%s: running, process %s", child.program.name, child.pid)
         if child.program.vital:
-            if not self._ready:
-                self._ready = True
-                self._notifier.ready()
-            self._notifier.watchdog()
+            self._pass_on_beat(was_running)
+
+    def _pass_on_beat(self, was_running: bool) -> None:
+        if not was_running and self._notifier.watchdog_period:
+            self._notifier.watchdog_within(self._notifier.watchdog_period)
+        if not self._ready:
+            self._ready = True
+            self._notifier.ready()
+        self._notifier.watchdog()
 
     def _bury(self, child: Child, descriptor: int) -> None:
         """Take note of the end of a child."""
         self._selector.unregister(descriptor)
         os.close(descriptor)
+        if child.program.heart is not None:
+            self._selector.unregister(child.program.heart)
         now = time.monotonic()
         expected = child.state == "stopping"
         how = child.ended(now)
@@ -222,18 +244,15 @@ class Supervisor:
             del self._children[name]
         elif not expected:
             _log.warning("%s: %s; starting again in %.1f s", name, how, child.due - now)
-            if child.program.vital and child.failed_starts >= START_LIMIT:
-                _log.error("%s: could not be started %d times in a row (%s): giving up", name, START_LIMIT, how)
-                self._exit_status = 1
-                self._stopping = True
+            self._give_up_on(child)
 
-    def _watch_heart(self, child: Child) -> None:
-        if child.program.heart is not None:
-            self._selector.register(child.program.heart, selectors.EVENT_READ, child)
-
-    def _forget_heart(self, child: Child) -> None:
-        if child.program.heart is not None:
-            self._selector.unregister(child.program.heart)
+    def _give_up_on(self, child: Child) -> None:
+        """Stop everything when it is the vital one that failed to start once too often."""
+        if child.program.vital and child.failed_starts >= START_LIMIT:
+            name = child.program.name
+            _log.error("%s: %d starts in a row failed (%s): giving up", name, START_LIMIT, child.reason)
+            self._exit_status = 1
+            self._stopping = True
 
     # --- the outside ----------------------------------------------------------------------------
 
@@ -251,7 +270,9 @@ class Supervisor:
             self._kept = ""
             _log.info("SIGHUP: took the new configuration")
             self._adopt()
-            renewed = any(child.program.vital and child.state != "running" for child in self._children.values())
+            renewed = any(
+                child.program.vital and child.state != "running" for child in self._children.values()
+            )
             self._ready = not renewed
             if self._ready:
                 self._notifier.ready()
@@ -298,6 +319,23 @@ class Supervisor:
 
     def _living(self) -> list[Child]:
         return [child for child in self._children.values() if child.alive]
+
+
+def _noted(_signal: int, _frame: object) -> None:
+    """Let a signal through to the wake-up descriptor."""
+
+
+def run(path: Path) -> int:
+    """Run the daemon that a configuration file describes, until SIGTERM; return the exit status.
+
+    Raises
+    ------
+    ConfigurationError
+        The file is wrong.
+    """
+    write_log()
+    with contextlib.closing(Wiring(path)) as wiring:
+        return Supervisor(wiring, Notifier()).run()
 
 
 def _in_words(statuses: Sequence[ProcessStatus]) -> str:

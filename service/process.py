@@ -1,0 +1,120 @@
+"""Entry of every process but the supervisor, and started only by it: ``python -m service.process <role> …``.
+
+The roles are ``loop``, ``publisher`` and ``link``. The arguments are numbers of descriptors that the
+supervisor passes on; see :mod:`service.wiring`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import signal
+import sys
+from collections.abc import Callable
+
+from service import kernels
+from service.channels import Heart, Outlet, inherited
+from service.config import Configuration
+from service.journal import write_log
+from service.realtime import die_with_parent, freeze_garbage, punctual
+from service.wiring import configuration_from
+
+_log = logging.getLogger(__name__)
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m service.process", description=__doc__)
+    roles = parser.add_subparsers(dest="role", required=True)
+    publisher = roles.add_parser("publisher")
+    publisher.add_argument("--estimates", type=int, required=True)
+    loop = roles.add_parser("loop")
+    loop.add_argument("--heart", type=int, required=True)
+    loop.add_argument("--publisher", type=int, required=True)
+    loop.add_argument("--link", action="append", default=[], metavar="NAME=DESCRIPTOR")
+    link = roles.add_parser("link")
+    link.add_argument("--name", required=True)
+    link.add_argument("--heart", type=int, required=True)
+    link.add_argument("--samples", type=int, required=True)
+    for role in (publisher, loop, link):
+        role.add_argument("--parent", type=int, required=True)
+        role.add_argument("--configuration", type=int, required=True)
+    return parser
+
+
+def _publisher(configuration: Configuration, arguments: argparse.Namespace) -> None:
+    from service.publish.zenoh import run
+
+    run(configuration, inherited(arguments.estimates))
+
+
+def _link(configuration: Configuration, arguments: argparse.Namespace) -> None:
+    from service.link_process import LinkProcess
+    from service.links import link_named
+
+    signal.signal(signal.SIGTERM, _leave)
+    link = link_named(configuration, arguments.name)
+    LinkProcess(arguments.name, link, inherited(arguments.samples), Heart(inherited(arguments.heart))).run()
+
+
+def _leave(_signal: int, _frame: object) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise SystemExit(0)
+
+
+def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
+    heart = Heart(inherited(arguments.heart))
+    kernels.warm(lambda name, done, count: heart.announce(f"compiling kernels, {done} of {count}: {name}"))
+
+    from service.budget import Meters
+    from service.estimator import Estimator
+    from service.inlet import Inlet
+    from service.loop import Loop
+    from service.rehearsal import rehearse
+
+    heart.announce("rehearsing")
+    rehearse(configuration)
+    meters = Meters(configuration.loop.rate)
+    links = (argument.rpartition("=") for argument in arguments.link)
+    loop = Loop(
+        configuration,
+        Estimator(configuration, meters),
+        meters,
+        [Inlet(name, inherited(int(descriptor))) for name, _, descriptor in links],
+        Outlet(inherited(arguments.publisher)),
+        heart,
+    )
+    stopped = _stop_flag()
+    for refusal in punctual(configuration.loop.priority, configuration.loop.cpus):
+        _log.warning("loop: %s", refusal)
+    freeze_garbage()
+    loop.run(stopped)
+    _log.info("loop: %s", loop.summary())
+
+
+def _stop_flag() -> Callable[[], bool]:
+    """Return what tells whether SIGTERM has come: the tick under way is finished first."""
+    stop = False
+
+    def note(_signal: int, _frame: object) -> None:
+        nonlocal stop
+        stop = True
+
+    signal.signal(signal.SIGTERM, note)
+    return lambda: stop
+
+
+_ROLES = {"publisher": _publisher, "loop": _loop, "link": _link}
+
+
+def main() -> int:
+    """Run one role until SIGTERM; return the exit status."""
+    arguments = _arguments().parse_args()
+    die_with_parent(arguments.parent)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    write_log()
+    _ROLES[arguments.role](configuration_from(arguments.configuration), arguments)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
