@@ -91,14 +91,15 @@ class ParticleFilter(Generic[Control]):
         self._no_noise: Float32Array = np.zeros((rows, 1), np.float32)
         self._walks = _Walks((*motion.walks, *slow), self._particles, seed, self._pairs)
         self._keys = [random.key(seed, stream) for stream in range(self._pairs)]
-        self._starts = np.zeros(-(-capacity // block), np.int64)
+        self._places = np.zeros(capacity, np.int32)
+        self._sample: Float32Array = np.zeros(0, np.float32)
         self._bounds: list[tuple[int, int]] = []
         self._sums = np.zeros(2)
         self._moment_sums = np.zeros(weights.SUMS)
         self._spread_sums = np.zeros((len(names), 2))
         self._log_sum = 0.0
         self._stride = 1
-        self._samples = 0
+        self._centre_values: dict[str, float] = {}
         self._weighed = False
 
     @property
@@ -176,6 +177,7 @@ class ParticleFilter(Generic[Control]):
         if not 0.0 <= duration < math.inf:
             raise ValueError(f"predict: duration must be finite and not negative, got {duration} s")
         self._motion.move(self._centre, 0, 1, self._no_noise, control, duration)
+        self._centre_values.clear()
         self._step += 1
         step = self._step & 0xFFFFFFFF
         noise = self._noise
@@ -203,10 +205,10 @@ class ParticleFilter(Generic[Control]):
                 raise ValueError(f"{type(sensor).__name__}: a measurement must be finite, got {measurement}")
         if sensor.refusal(measurement) is not None:
             return Evidence(math.nan, math.nan, accepted=False)
-        innovation = sensor.innovation(self._centre, measurement)
+        innovation = sensor.innovation(self._centre_state(), measurement)
         constant = sensor.weigh(self._particles, 0, self.count, measurement)
         before = self._log_sum
-        self._log_sum = weights.log_sum(self._particles.log_weights, self._stride, self._samples)
+        self._log_sum = weights.log_sum(self._particles.log_weights, self._stride, self._sample)
         self._weighed = True
         return Evidence(constant + self._log_sum - before, innovation, accepted=True)
 
@@ -237,7 +239,7 @@ class ParticleFilter(Generic[Control]):
         """
         self._settle()
         shift = STILL if displacement is None else displacement
-        centre = self._centre.columns[:, 0].astype(np.float64)
+        centre: list[float] = self._centre.columns[:, 0].tolist()
         north, east, heading = _displaced(centre, shift)
         sums, offset = self._pose_sums(shift, north, east, heading)
         if abs(offset) > 1e-6 and sums[12] + abs(offset) >= 3.14:
@@ -245,19 +247,36 @@ class ParticleFilter(Generic[Control]):
                 offset  # some particle's difference wraps elsewhere about the mean than about the reference
             )
             sums, offset = self._pose_sums(shift, north, east, heading)
-        mean_north, mean_east, mean_heading = (float(s) for s in sums[1:4] / sums[0])
-        nn, ne, ee, nh, eh, hh = (float(s) for s in sums[6:12] / sums[0])
-        covariance = np.empty((3, 3))
-        covariance[0] = (nn - mean_north**2, ne - mean_north * mean_east, nh - mean_north * mean_heading)
-        covariance[1] = (covariance[0, 1], ee - mean_east**2, eh - mean_east * mean_heading)
-        covariance[2] = (covariance[0, 2], covariance[1, 2], hh - 2.0 * offset * mean_heading + offset**2)
-        np.fill_diagonal(covariance, np.maximum(covariance.diagonal(), 0.0))
-        mean, variance = self._spread(centre)
-        variance[:3] = covariance.diagonal()
-        mean[:3] = centre[0] + mean_north, centre[1] + mean_east, _wrap(heading + offset - shift.turn)
-        self._centre.columns[:, 0] = mean
-        mean[:3] = north + mean_north, east + mean_east, _wrap(heading + offset)
-        return Moments(self.names, mean, covariance, variance, self.effective_sample_size)
+        n, e, h = (part / sums[0] for part in sums[1:4])
+        nn, ne, ee, nh, eh, hh = (part / sums[0] for part in sums[6:12])
+        covariance_ne, covariance_nh, covariance_eh = ne - n * e, nh - n * h, eh - e * h
+        variances = (
+            max(nn - n * n, 0.0),
+            max(ee - e * e, 0.0),
+            max(hh - 2.0 * offset * h + offset * offset, 0.0),
+        )
+        covariance = np.array(
+            [
+                [variances[0], covariance_ne, covariance_nh],
+                [covariance_ne, variances[1], covariance_eh],
+                [covariance_nh, covariance_eh, variances[2]],
+            ]
+        )
+        slow, slow_variances = self._spread(centre)
+        self._centre.columns[:, 0] = (
+            centre[0] + n,
+            centre[1] + e,
+            _wrap(heading + offset - shift.turn),
+            *slow,
+        )
+        self._centre_values.clear()
+        return Moments(
+            self.names,
+            np.array([north + n, east + e, _wrap(heading + offset), *slow]),
+            covariance,
+            np.array([*variances, *slow_variances]),
+            self.effective_sample_size,
+        )
 
     def resample(self, count: int | None = None) -> None:
         """Lines 8 to 11 by Table 4.4: draw ``count`` particles, equally weighted; as many as now by default.
@@ -279,10 +298,8 @@ class ParticleFilter(Generic[Control]):
         ancestors = self._ancestors[:target]
         resampling.systematic(source, resampling.total(source), uniform, ancestors)
         self._recount(target)
-        starts = self._starts[: len(self._bounds)]
         columns = self._particles.columns
-        for row in range(len(self.names)):
-            resampling.deal(columns[row], self._spare[row], ancestors, starts)
+        resampling.deal(columns, self._spare, ancestors, self._places[:target])
         self._particles.columns, self._spare = self._spare, columns
         self._level()
 
@@ -324,7 +341,7 @@ class ParticleFilter(Generic[Control]):
         self._particles.log_weights[:count] = 0.0
         self._weights[:count] = 1.0
         self._sums[:] = count
-        self._log_sum = math.log(self._samples)
+        self._log_sum = math.log(self._sample.size)
         self._weighed = False
 
     def _recount(self, count: int) -> None:
@@ -333,32 +350,41 @@ class ParticleFilter(Generic[Control]):
             return
         self._particles.count = count
         self._stride = -(-count // EVIDENCE_SAMPLE)
-        self._samples = count // self._stride
+        self._sample = np.empty(count // self._stride, np.float32)
         blocks = -(-count // self._block)
         size, rest = divmod(count, blocks)
         starts = [block * size + min(block, rest) for block in range(blocks)] + [count]
         self._bounds = list(pairwise(starts))
-        self._starts[:blocks] = starts[:-1]
+        resampling.places(np.array(starts[:-1], np.int64), self._places[:count])
+
+    def _centre_state(self) -> dict[str, float]:
+        """Centre of the belief by name."""
+        if not self._centre_values:
+            self._centre_values.update(zip(self.names, self._centre.columns[:, 0].tolist(), strict=True))
+        return self._centre_values
 
     def _pose_sums(
         self, shift: Displacement, north: float, east: float, heading: float
-    ) -> tuple[NDArray[np.float64], float]:
+    ) -> tuple[list[float], float]:
         """Sums about a reference pose, and how far the circular mean lies from the reference heading."""
         sums = self._moment_sums
         sums[:] = 0.0
         columns = self._particles.columns
         for first, last in self._bounds:
             weights.moments(columns, self._weights, first, last, *shift, north, east, heading, sums)
-        return sums, math.atan2(sums[4], sums[5])
+        values: list[float] = sums.tolist()
+        return values, math.atan2(values[4], values[5])
 
-    def _spread(self, centre: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _spread(self, centre: list[float]) -> tuple[list[float], list[float]]:
         """Mean and variance of every column beside the pose."""
         sums = self._spread_sums
         sums[:] = 0.0
         for first, last in self._bounds:
             weights.spread(self._particles.columns, self._weights, first, last, self._centre.columns, sums)
-        offset, square = sums.T / self._sums[0]
-        return centre + offset, np.maximum(square - offset * offset, 0.0)
+        total = float(self._sums[0])
+        offsets = [(offset / total, square / total) for offset, square in sums[3:].tolist()]
+        means = [reference + offset for reference, (offset, _) in zip(centre[3:], offsets, strict=True)]
+        return means, [max(square - offset * offset, 0.0) for offset, square in offsets]
 
 
 class _Walk:
@@ -407,9 +433,9 @@ def _wrap(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-def _displaced(centre: NDArray[np.float64], shift: Displacement) -> tuple[float, float, float]:
+def _displaced(centre: list[float], shift: Displacement) -> tuple[float, float, float]:
     """Pose of the displaced centre, rounded to float32 as the kernel will see it."""
-    north, east, heading = (float(part) for part in centre[:3])
+    north, east, heading = centre[:3]
     sine, cosine = math.sin(heading), math.cos(heading)
     north += shift.forward * cosine - shift.right * sine
     east += shift.forward * sine + shift.right * cosine

@@ -48,7 +48,3 @@ class ParticleSet:
             return self.rows[name]
         except KeyError:
             raise KeyError(f"no dimension {name!r} among {', '.join(self.names)}") from None
-
-    def value(self, name: str) -> float:
-        """Value of a dimension in the first particle: for sets of one, such as a belief's centre."""
-        return float(self.columns[self.row(name), 0])

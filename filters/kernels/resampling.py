@@ -34,7 +34,7 @@ def systematic(weights: Float32Array, total: float, uniform: float, ancestors: I
     end = 0
     for i in range(weights.size):
         if end < count:  # a source without a copy is overwritten by the next
-            ancestors[end] = i
+            ancestors[np.uint64(end)] = i
         cumulative += weights[i]
         end = min(count, int(cumulative * scale + 1.0 - uniform))
     if end < count:
@@ -48,22 +48,30 @@ def systematic(weights: Float32Array, total: float, uniform: float, ancestors: I
         ancestors[m] = latest
 
 
-@kernel("void(float32[::1], float32[::1], int32[::1], int64[::1])", exact=True)
-def deal(
-    source: Float32Array, target: Float32Array, ancestors: Int32Array, starts: NDArray[np.int64]
-) -> None:
-    """Deal a column's copies to the blocks in turn, like cards, so that each block gets a fair sample.
+@kernel("void(int64[::1], int32[::1])", exact=True)
+def places(starts: NDArray[np.int64], places: Int32Array) -> None:
+    """Say where each copy is laid: dealt to the blocks in turn, like cards, so that each gets a fair sample.
 
-    ``ancestors`` ascend; laid down in a row, the first block would hold only the first ancestors' copies.
+    Ancestors ascend; laid down in a row, the first block would hold only the first ancestors' copies.
+    ``starts`` are the blocks' first places; earlier blocks may be larger by one.
     """
     blocks = starts.size
-    count = ancestors.size
-    rounds = count // blocks
+    rounds = places.size // blocks
     m = 0
     for position in range(rounds):
         for block in range(blocks):
-            target[starts[block] + position] = source[ancestors[m]]
+            places[m] = starts[block] + position
             m += 1
-    for block in range(count - m):
-        target[starts[block] + rounds] = source[ancestors[m]]
+    for block in range(places.size - m):
+        places[m] = starts[block] + rounds
         m += 1
+
+
+@kernel("void(float32[:, ::1], float32[:, ::1], int32[::1], int32[::1])", exact=True)
+def deal(source: Float32Array, target: Float32Array, ancestors: Int32Array, places: Int32Array) -> None:
+    """Copy every column's ancestors to their places."""
+    for row in range(source.shape[0]):
+        old = source[row]
+        new = target[row]
+        for m in range(ancestors.size):
+            new[np.uint32(places[m])] = old[np.uint32(ancestors[m])]

@@ -27,8 +27,9 @@ SUMS = 13
 def peak(log_weights: Float32Array, first: int, last: int) -> np.float32:
     """Largest log weight of a block; NaN if there is one (its bits order above infinity)."""
     largest = int32(-2147483647)
-    for i in range(first, last):
-        largest = max(largest, order(log_weights[i]))
+    logs = log_weights[first:last]
+    for i in range(last - first):
+        largest = max(largest, order(logs[i]))
     return from_order(largest)
 
 
@@ -37,31 +38,39 @@ def exponentiate(
     log_weights: Float32Array, weights: Float32Array, first: int, last: int, top: float, sums: Float64Array
 ) -> None:
     """Take ``top`` off the log weights, write the weights, and add their sum and squares to ``sums``."""
+    logs = log_weights[first:last]
+    out = weights[first:last]
     total = float32(0.0)
     squares = float32(0.0)
-    for i in range(first, last):
-        log_weight = float32(log_weights[i] - top)
+    for i in range(last - first):
+        log_weight = float32(logs[i] - top)
         weight = exp(log_weight)
-        log_weights[i] = log_weight
-        weights[i] = weight
+        logs[i] = log_weight
+        out[i] = weight
         total += weight
         squares += weight * weight
     sums[0] += total
     sums[1] += squares
 
 
-@kernel("float64(float32[::1], int64, int64)")
-def log_sum(log_weights: Float32Array, stride: int, samples: int) -> float:
-    """Logarithm of the sum of the weights of every ``stride``-th particle; minus infinity if all are zero."""
+@kernel("float64(float32[::1], int64, float32[::1])")
+def log_sum(log_weights: Float32Array, stride: int, sample: Float32Array) -> float:
+    """Logarithm of the sum of the weights of every ``stride``-th particle; minus infinity if all are zero.
+
+    ``sample`` takes them: a strided loop does not vectorise.
+    """
+    count = sample.size
+    for k in range(count):
+        sample[k] = log_weights[np.uint64(k * stride)]
     largest = int32(-2147483647)
-    for i in range(samples):
-        largest = max(largest, order(log_weights[i * stride]))
+    for k in range(count):
+        largest = max(largest, order(sample[k]))
     top = from_order(largest)
     if not top > float32(-np.inf):
         return -np.inf
     total = float32(0.0)
-    for i in range(samples):
-        total += exp(float32(log_weights[i * stride] - top))
+    for k in range(count):
+        total += exp(float32(sample[k] - top))
     return float(math.log(total) + top)
 
 

@@ -9,6 +9,7 @@ below pi, with the outlier part uniform over the circle.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from numpy import float32
@@ -84,9 +85,9 @@ class Heading:
         )
         return mixed.log_peak
 
-    def innovation(self, centre: ParticleSet, measurement: HeadingMeasurement) -> float:
+    def innovation(self, centre: Mapping[str, float], measurement: HeadingMeasurement) -> float:
         """Measured less expected heading at the centre, radians in [-pi, pi]."""
-        expected = centre.value("heading") + (0.0 if self.bias is None else centre.value(self.bias))
+        expected = centre["heading"] + (0.0 if self.bias is None else centre[self.bias])
         return math.remainder(measurement.heading - expected, _CIRCLE)
 
 

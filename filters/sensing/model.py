@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol, TypeVar
 
 from filters.particle_set import ParticleSet
@@ -36,6 +37,6 @@ class Sensor(Protocol[Measurement]):
         """
         ...
 
-    def innovation(self, centre: ParticleSet, measurement: Measurement) -> float:
-        """Measured minus expected at the belief's centre, a set of one particle."""
+    def innovation(self, centre: Mapping[str, float], measurement: Measurement) -> float:
+        """Measured minus expected at the belief's centre, given by the names of its dimensions."""
         ...

@@ -8,6 +8,7 @@ with the lever from the body's centre to the antenna (forward, right), and the o
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from numpy import float32
@@ -101,12 +102,12 @@ class Position:
         )
         return mixed.log_peak
 
-    def innovation(self, centre: ParticleSet, measurement: PositionMeasurement) -> float:
+    def innovation(self, centre: Mapping[str, float], measurement: PositionMeasurement) -> float:
         """Distance between measured and expected position at the centre, metres."""
-        heading = centre.value("heading")
+        heading = centre["heading"]
         forward, right = self.lever
-        north = centre.value("north") + forward * math.cos(heading) - right * math.sin(heading)
-        east = centre.value("east") + forward * math.sin(heading) + right * math.cos(heading)
+        north = centre["north"] + forward * math.cos(heading) - right * math.sin(heading)
+        east = centre["east"] + forward * math.sin(heading) + right * math.cos(heading)
         return math.hypot(measurement.north - north, measurement.east - east)
 
 

@@ -9,6 +9,7 @@ outlier part, as the range part of the beam and landmark models of chapter 6 of 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from numpy import float32
@@ -117,15 +118,15 @@ class Range:
         )
         return mixed.log_peak
 
-    def innovation(self, centre: ParticleSet, measurement: RangeMeasurement) -> float:
+    def innovation(self, centre: Mapping[str, float], measurement: RangeMeasurement) -> float:
         """Measured less expected distance at the centre, metres."""
-        north = centre.value("north") - measurement.north
-        east = centre.value("east") - measurement.east
+        north = centre["north"] - measurement.north
+        east = centre["east"] - measurement.east
         expected = math.sqrt(north * north + east * east + measurement.down_difference**2)
         if self.scale is not None:
-            expected *= centre.value(self.scale)
+            expected *= centre[self.scale]
         if self.bias is not None:
-            expected += centre.value(self.bias)
+            expected += centre[self.bias]
         return measurement.distance - expected
 
 

@@ -8,6 +8,7 @@ A belief weighed so never loses a particle to one bad reading: the log likelihoo
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 NEVER = -3e38
@@ -22,6 +23,7 @@ class Mixture(NamedTuple):
     log_peak: float
 
 
+@lru_cache(maxsize=1024)
 def mixture(outliers: float, log_inlier_density: float, log_outlier_density: float) -> Mixture:
     """Mix an inlier density, given at its peak, with a uniform one."""
     if outliers == 0.0:

@@ -9,6 +9,7 @@ heading (as a course) and on the scale. With the outlier part.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from numpy import float32
@@ -99,10 +100,10 @@ class Velocity:
         )
         return mixed.log_peak
 
-    def innovation(self, centre: ParticleSet, measurement: VelocityMeasurement) -> float:
+    def innovation(self, centre: Mapping[str, float], measurement: VelocityMeasurement) -> float:
         """Distance between measured and expected velocity at the centre, m/s."""
-        speed = measurement.speed * (1.0 if self.scale is None else centre.value(self.scale))
-        heading = centre.value("heading")
+        speed = measurement.speed * (1.0 if self.scale is None else centre[self.scale])
+        heading = centre["heading"]
         return math.hypot(
             measurement.north - speed * math.cos(heading), measurement.east - speed * math.sin(heading)
         )
