@@ -8,6 +8,7 @@ from collections import Counter
 from typing import Any
 
 import can
+from can.interfaces.slcan import slcanBus
 
 from drivers.can.arrival import ArrivalClock
 from drivers.can.dronecan import Decoder
@@ -106,7 +107,7 @@ class CanLink:
             self._bus = self._open_bus()
         except (can.CanError, OSError, ImportError, ValueError, TypeError, RuntimeError) as error:
             remedy = _REMEDIES.get(_code(error) or 0, _OPEN_REMEDY)
-            if isinstance(error, can.CanInterfaceNotImplementedError):
+            if isinstance(error, NotImplementedError):  # unknown to python-can, or its driver is missing
                 known = ", ".join(sorted({MULTICAST, *can.VALID_INTERFACES}))
                 remedy = f"interface should be one of {known}, with its driver installed"
             raise LinkError(f"{self._name}: cannot open {self.place}: {error}; {remedy}") from error
@@ -188,6 +189,8 @@ class CanLink:
     def _fail(self, error: Exception) -> None:
         """Count a damaged frame; a broken bus ends the link."""
         if _is_damage(error):
+            if isinstance(self._bus, slcanBus) and isinstance(error.__cause__, UnicodeDecodeError):
+                self._bus.flush()  # python-can would keep the unreadable bytes, and fail for ever
             self._refused["damaged_frame"] += 1
             self._damaged_in_a_row += 1
             if self._damaged_in_a_row < _MOST_DAMAGED:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import multiprocessing
+import os
 import queue
 import signal
 from typing import Any
@@ -24,11 +25,13 @@ _PR_SET_PDEATHSIG = 1
 _SECONDS_TO_END = 1.0
 
 
-def _receive(bus_number: str, to_send: Any, received: Any) -> None:
+def _receive(bus_number: str, to_send: Any, received: Any, parent: int) -> None:
     """Run the driver's loop; say what ended it. Ends with its parent, however that ends."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        return  # it ended before it could be watched
     try:
         io_process(bus_number, to_send, received)
     except OSError as error:
@@ -61,7 +64,7 @@ class MulticastBus(can.BusABC):
         self._process = context.Process(
             target=_receive,
             name=f"mcast {channel}",
-            args=(channel, self._to_send, self._received),
+            args=(channel, self._to_send, self._received, os.getpid()),
             daemon=True,
         )
         self._process.start()
