@@ -44,7 +44,9 @@ def test_faults_drop_repeat_delay_and_corrupt() -> None:
     settings = WireSettings(latency=0.01)
     assert wire(settings, Fault("mavlink", Kind.DROP)).carry(1.0, b"abc") == []
     assert wire(settings, Fault("mavlink", Kind.REPEAT)).carry(1.0, b"abc") == [(1.01, b"abc")] * 2
-    assert wire(settings, Fault("mavlink", Kind.DELAY, delay=0.2)).carry(1.0, b"abc")[0].time == pytest.approx(1.21)
+    assert wire(settings, Fault("mavlink", Kind.DELAY, delay=0.2)).carry(1.0, b"abc")[
+        0
+    ].time == pytest.approx(1.21)
     spoilt = [wire(settings, Fault("mavlink", Kind.CORRUPT)).carry(1.0, bytes(30))[0].frame][0]
     assert spoilt != bytes(30)
     assert len(spoilt) == 30

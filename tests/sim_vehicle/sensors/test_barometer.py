@@ -20,6 +20,8 @@ def test_pressures_are_those_of_the_table(altitude: float, pressure: float) -> N
 def test_noise_and_drift_have_the_spread_of_the_settings() -> None:
     """2,000 barometers: five sigma of a mean and of a standard deviation."""
     settings = BarometerSettings(Cadence(10.0), noise=3.0, drift=4.0)
-    values = [Barometer(settings, 500.0, stream(seed, "b")).measure(straight(0.0)).pressure for seed in range(2000)]
+    values = [
+        Barometer(settings, 500.0, stream(seed, "b")).measure(straight(0.0)).pressure for seed in range(2000)
+    ]
     assert np.mean(values) == pytest.approx(standard_pressure(500.0), abs=5.0 * 5.0 / np.sqrt(2000))
     assert np.std(values) == pytest.approx(5.0, rel=5.0 / np.sqrt(4000))

@@ -27,11 +27,15 @@ def test_noise_and_outliers_have_the_statistics_of_the_settings() -> None:
     """20,000 ranges: shares and spread within five sigma. A detour longer than 1.5 m has probability exp(-1.5 / 4)."""
     settings = RangerSettings(CADENCE, SITES[:1], sigma=0.3, outliers=0.1, outlier_mean=4.0)
     ranger = Ranger(settings, stream(2, "r"))
-    errors = np.array([reading.distance - 50.0 for _ in range(20_000) if (reading := ranger.measure(straight(0.0)))])
+    errors = np.array(
+        [reading.distance - 50.0 for _ in range(20_000) if (reading := ranger.measure(straight(0.0)))]
+    )
     far = 0.1 * math.exp(-1.5 / 4.0)
     assert (errors > 1.5).mean() == pytest.approx(far, abs=5.0 * math.sqrt(far / 20_000) + 0.004)
     clean = Ranger(RangerSettings(CADENCE, SITES[:1], sigma=0.3), stream(2, "r"))
-    white = np.array([reading.distance - 50.0 for _ in range(20_000) if (reading := clean.measure(straight(0.0)))])
+    white = np.array(
+        [reading.distance - 50.0 for _ in range(20_000) if (reading := clean.measure(straight(0.0)))]
+    )
     assert white.std() == pytest.approx(0.3, rel=5.0 / math.sqrt(40_000))
     assert abs(white.mean()) < 5.0 * 0.3 / math.sqrt(20_000)
     # The same luck with and without long paths: only those differ, and they are longer.

@@ -18,7 +18,9 @@ CADENCE = Cadence(25.0)
 def test_the_field_shows_the_heading(heading: float) -> None:
     settings = CompassSettings(CADENCE, earth=(20e-6, 3e-6, 44e-6))
     reading = Compass(settings, stream(1, "c")).measure(straight(0.0, heading=heading))
-    assert math.remainder(reading.heading(settings.declination) - heading, math.tau) == pytest.approx(0.0, abs=1e-12)
+    assert math.remainder(reading.heading(settings.declination) - heading, math.tau) == pytest.approx(
+        0.0, abs=1e-12
+    )
     assert math.hypot(*reading.field) == pytest.approx(math.hypot(20e-6, 3e-6, 44e-6))
 
 
@@ -31,7 +33,9 @@ def test_facing_magnetic_east_the_horizontal_field_is_on_the_left() -> None:
 def test_noise_and_disturbance_have_the_spread_of_the_settings() -> None:
     """2,000 compasses, one reading each: five sigma of a standard deviation."""
     settings = CompassSettings(CADENCE, earth=(20e-6, 0.0, 44e-6), noise=0.2e-6, disturbance=0.03)
-    headings = [Compass(settings, stream(seed, "c")).measure(straight(0.0)).heading(0.0) for seed in range(2000)]
+    headings = [
+        Compass(settings, stream(seed, "c")).measure(straight(0.0)).heading(0.0) for seed in range(2000)
+    ]
     expected = math.hypot(0.03, 0.2 / 20.0)
     assert np.std(headings) == pytest.approx(expected, rel=5.0 / math.sqrt(4000))
     assert abs(np.mean(headings)) < 5.0 * expected / math.sqrt(2000)

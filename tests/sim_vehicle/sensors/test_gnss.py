@@ -39,7 +39,8 @@ def test_the_position_is_older_than_its_stamp() -> None:
 
 def test_dilution_grows_the_claim_and_takes_satellites() -> None:
     readings = [
-        Gnss(GnssSettings(CADENCE, dilution_spread=0.4), stream(seed, "g")).measure(straight(0.0)) for seed in range(200)
+        Gnss(GnssSettings(CADENCE, dilution_spread=0.4), stream(seed, "g")).measure(straight(0.0))
+        for seed in range(200)
     ]
     dilutions = np.array([reading.dilution for reading in readings])
     claims = np.array([reading.accuracy_horizontal for reading in readings])

@@ -16,7 +16,9 @@ CADENCE = Cadence(100.0)
 
 
 def test_a_perfect_unit_feels_the_turn_and_gravity() -> None:
-    reading = Inertial(InertialSettings(CADENCE), stream(1, "i")).measure(turning(1.0, speed=2.0, yaw_rate=0.4))
+    reading = Inertial(InertialSettings(CADENCE), stream(1, "i")).measure(
+        turning(1.0, speed=2.0, yaw_rate=0.4)
+    )
     assert reading.angular_velocity == pytest.approx((0.0, 0.0, 0.4))
     assert reading.specific_force == pytest.approx((0.3, 0.8, -GRAVITY))
 

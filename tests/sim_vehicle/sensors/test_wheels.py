@@ -36,7 +36,9 @@ def test_slip_has_the_spread_of_the_settings() -> None:
     """Correlated slip over T: the distance's sigma is slip v sqrt(2 tau T) for T ≫ tau; 300 drives, 5 sigma of a sigma."""
     drives = []
     for seed in range(300):
-        wheels = Wheels(WheelSettings(CADENCE, slip=0.03, slip_correlation=1.0, tick=1e-6), stream(seed, "wheels"))
+        wheels = Wheels(
+            WheelSettings(CADENCE, slip=0.03, slip_correlation=1.0, tick=1e-6), stream(seed, "wheels")
+        )
         for count in range(1, 501):
             reading = wheels.measure(straight(count / 10.0))
         drives.append(reading.left - 75.0)

@@ -1,0 +1,142 @@
+"""Ports on real sockets and buses: both directions, drops counted, refusals that say what would be right."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import uuid
+from collections.abc import Iterator
+
+import can
+import pytest
+
+from sim_vehicle.dsdl import CanFrame
+from sim_vehicle.ports import MavlinkPort, PortError, open_can, open_mavlink
+
+
+@contextlib.contextmanager
+def opened(url: str) -> Iterator[tuple[MavlinkPort, int]]:
+    port = open_mavlink(url)
+    try:
+        yield port, int(port.address.rpartition(":")[2])
+    finally:
+        port.close()
+
+
+def heard(port: MavlinkPort) -> bytes:
+    """Return what comes next; waited for at most 5 s."""
+    for _ in range(100):
+        select.select(port.filenos(), [], [], 0.05)
+        if data := port.receive():
+            return b"".join(data)
+    raise AssertionError("nothing came in 5 s")
+
+
+def test_udpout_sends_to_its_place_and_hears_the_answer() -> None:
+    with contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.settimeout(5.0)
+        with opened(f"udpout:127.0.0.1:{listener.getsockname()[1]}") as (port, _):
+            port.send(b"hello")
+            data, peer = listener.recvfrom(100)
+            listener.sendto(b"answer", peer)
+            assert (data, heard(port), port.dropped) == (b"hello", b"answer", 0)
+
+
+def test_udpout_goes_on_when_nobody_listens() -> None:
+    with contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as closed:
+        closed.bind(("127.0.0.1", 0))
+        place = closed.getsockname()[1]
+    with opened(f"udpout:127.0.0.1:{place}") as (port, _):
+        for _ in range(10):
+            port.send(b"anyone?")
+            assert port.receive() == []
+
+
+def test_udpin_waits_until_it_is_spoken_to() -> None:
+    with (
+        opened("udpin:127.0.0.1:0") as (port, number),
+        contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as client,
+    ):
+        client.settimeout(5.0)
+        port.send(b"lost")
+        assert port.dropped == 1
+        client.sendto(b"hello", ("127.0.0.1", number))
+        assert heard(port) == b"hello"
+        port.send(b"found")
+        assert client.recv(100) == b"found"
+
+
+def test_tcpin_serves_one_client_after_another() -> None:
+    with opened("tcpin:127.0.0.1:0") as (port, number):
+        port.send(b"lost")
+        assert port.dropped == 1
+        for greeting in (b"first", b"second"):
+            with contextlib.closing(socket.create_connection(("127.0.0.1", number), timeout=5.0)) as client:
+                client.sendall(greeting)
+                assert heard(port) == greeting
+                port.send(b"frame")
+                assert client.recv(100) == b"frame"
+
+
+def test_a_tcp_client_that_does_not_read_blocks_nothing() -> None:
+    with opened("tcpin:127.0.0.1:0") as (port, number):
+        with contextlib.closing(socket.create_connection(("127.0.0.1", number), timeout=5.0)) as client:
+            client.sendall(b"hello")
+            heard(port)
+            for _ in range(20_000):
+                port.send(bytes(280))
+            assert port.dropped > 0
+        port.receive()
+        port.receive()
+        before = port.dropped
+        port.send(b"gone")
+        assert port.dropped == before + 1
+
+
+@pytest.mark.parametrize(
+    "url", ["", "udp:127.0.0.1:14550", "udpin:14550", "udpin:127.0.0.1:x", "udpin:127.0.0.1:70000"]
+)
+def test_a_url_of_another_kind_is_refused(url: str) -> None:
+    with pytest.raises(PortError, match="needs udpout:HOST:PORT, udpin:HOST:PORT or tcpin:HOST:PORT"):
+        open_mavlink(url)
+
+
+def test_a_taken_port_is_refused() -> None:
+    with (
+        opened("udpin:127.0.0.1:0") as (_, number),
+        pytest.raises(PortError, match="choose another port or stop who has it"),
+    ):
+        open_mavlink(f"udpin:127.0.0.1:{number}")
+
+
+def test_a_bus_of_python_can_carries_the_frames_both_ways() -> None:
+    channel = f"sim-{uuid.uuid4()}"
+    port = open_can(f"virtual:{channel}")
+    with can.Bus(interface="virtual", channel=channel) as other:
+        port.send(CanFrame(0x1004172A, b"\x01\x02"))
+        message = other.recv(timeout=5.0)
+        assert message is not None
+        assert (message.arbitration_id, message.is_extended_id, bytes(message.data)) == (
+            0x1004172A,
+            True,
+            b"\x01\x02",
+        )
+        other.send(can.Message(arbitration_id=1, data=b"x"))
+        port.serve()
+        assert (port.received, port.dropped) == (1, 0)
+    port.close()
+
+
+@pytest.mark.parametrize(
+    ("where", "complaint"),
+    [
+        ("can0", "needs INTERFACE:CHANNEL"),
+        ("nosuch:can0", "nosuch"),
+        ("socketcan:nosuchcan9", "--can socketcan:nosuchcan9: "),
+    ],
+)
+def test_a_bus_that_cannot_be_opened_is_refused(where: str, complaint: str) -> None:
+    with pytest.raises(PortError, match=complaint):
+        open_can(where)
