@@ -11,10 +11,11 @@ import contextlib
 import io
 import math
 import os
+import re
 import signal
 import sys
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import zenoh
@@ -38,6 +39,8 @@ _FRAME = 0.125
 _MARGIN = 10.0
 _CLOSING = 1.0
 _PICTURE = (110, 32)
+_FONT_FACES = re.compile(r"@font-face\s*\{.*?\}\s*", re.DOTALL)
+"""Rich would have the viewer fetch a font from elsewhere; the reader's own monospace will do."""
 
 
 class _DemoError(Exception):
@@ -120,13 +123,14 @@ class _Watch:
     def through(self, seconds: float, picture: Path | None) -> Verdict:
         """Watch the daemon start and the vehicle drive; stop both, and judge."""
         with self._shown():
-            self._wait_for_first_estimate()
+            self._wait("the daemon starts", lambda: self._known.estimate is not None)
             self._stage.start_vehicle(seconds + _MARGIN)
+            self._wait("the vehicle starts", lambda: self._known.truth is not None)
             start = time.monotonic()
             while (elapsed := time.monotonic() - start) < seconds:
-                self._turn(f"{elapsed:.0f} of {seconds:g} s, {self._known.rate():.0f} estimates/s", elapsed)
+                self._turn(f"{elapsed:.0f} of {seconds:g} s, {self._known.rate():.0f} Hz", elapsed)
         if picture is not None:
-            self._draw(picture, f"{seconds:g} s, {self._known.rate():.0f} estimates/s")
+            self._draw(picture, f"{seconds:g} s, {self._known.rate():.0f} Hz")
         self._stage.stop()
         verdict = judge(self._record, self._stage.configuration, self._stage.truth)
         if verdict.failures:
@@ -144,12 +148,12 @@ class _Watch:
             yield
         self._live = None
 
-    def _wait_for_first_estimate(self) -> None:
+    def _wait(self, note: str, come: Callable[[], bool]) -> None:
         deadline = time.monotonic() + _START
-        while self._known.estimate is None:
-            self._turn("the daemon starts", None)
+        while not come():
+            self._turn(note, None)
             if time.monotonic() > deadline:
-                raise _DemoError(f"no estimate within {_START:g} s\n{self._stage.tail('daemon')}")
+                raise _DemoError(f"{note}, but not within {_START:g} s\n{self._stage.tail('daemon')}")
 
     def _turn(self, note: str, elapsed: float | None) -> None:
         deadline = time.monotonic() + _FRAME
@@ -180,7 +184,7 @@ class _Watch:
         )
         paper.print(Screen(self._known, note))
         picture.parent.mkdir(parents=True, exist_ok=True)
-        picture.write_text(paper.export_svg(title="beliefd demo"))
+        picture.write_text(_FONT_FACES.sub("", paper.export_svg(title="beliefd demo")))
 
 
 def _line(known: Known, second: int) -> str:

@@ -46,7 +46,8 @@ class Known:
         self.beacons: dict[int, Point] = {}
         self.truth: Point | None = None
         self.malformed = 0
-        self._arrivals: deque[float] = deque(maxlen=5000)
+        self._arrived: float | None = None
+        self._stamps: deque[float] = deque(maxlen=5000)
         self._earlier_links: dict[str, LinkStatus] = {}
         self._earlier_time = 0.0
 
@@ -81,14 +82,13 @@ class Known:
         return None if north is None or east is None else (north, east)
 
     def rate(self) -> float:
-        """Return how many estimates a second arrived over the last five seconds."""
-        now = time.monotonic()
-        lately = [arrival for arrival in self._arrivals if now - arrival <= _RATE_WINDOW]
+        """Return estimates per second, of those that arrived over the last five seconds of their time."""
+        lately = [stamp for stamp in self._stamps if self._stamps[-1] - stamp <= _RATE_WINDOW]
         return (len(lately) - 1) / (lately[-1] - lately[0]) if len(lately) > 1 else 0.0
 
     def silence(self) -> float | None:
         """Return the seconds since the last estimate arrived; ``None`` when none ever did."""
-        return time.monotonic() - self._arrivals[-1] if self._arrivals else None
+        return None if self._arrived is None else time.monotonic() - self._arrived
 
     def message_rate(self, link: LinkStatus) -> float | None:
         """Return a link's messages a second, between the last two values of ``sensors``."""
@@ -100,7 +100,9 @@ class Known:
 
     def _estimated(self, estimate: Estimate) -> None:
         self.estimate = estimate
-        self._arrivals.append(time.monotonic())
+        self._arrived = time.monotonic()
+        if not self._stamps or estimate.time > self._stamps[-1]:  # the slow one is the same once more
+            self._stamps.append(estimate.time)
         here = self.position
         if here is not None and (not self.track or _apart(here, self.track[-1]) >= _TRACK_STEP):
             self.track.append(here)

@@ -119,7 +119,7 @@ def _show(feed: Feed, known: Known, endpoint: str) -> None:
 def _standing(feed: Feed, known: Known, endpoint: str) -> str:
     if known.silence() is None:
         return "alive, but nothing arrives" if feed.alive else f"not alive at {endpoint}"
-    return f"{known.rate():.0f}/s from {endpoint}"
+    return f"{known.rate():.0f} Hz from {endpoint}"
 
 
 def _pipe(feed: Feed, known: Known, endpoint: str) -> None:

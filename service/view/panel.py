@@ -80,7 +80,7 @@ class Screen:
 
 def metres(value: float | None) -> str:
     """Return metres with two decimals, or a dash."""
-    return UNKNOWN if value is None else f"{value:.2f}"
+    return UNKNOWN if value is None else f"{round(value, 2) + 0.0:.2f}"  # no minus before a zero
 
 
 def _frame(content: RenderableType, title: str) -> Panel:
@@ -217,6 +217,7 @@ def _sources(known: Known, width: int) -> RenderableType:
     table.add_column(no_wrap=True, overflow="ellipsis", max_width=max(8, width - 7 * (columns - 1)))
     for _ in range(columns - 1):
         table.add_column(justify="right", no_wrap=True)
+    table.add_row(*(Text(heading, "grey62") for heading in ("link", "1/s", "state", "bad")))
     for link in known.sensors.links:
         table.add_row(*_link(known, link))
     headings = ("sensor", "Hz", "innov.", "age s", "used", "refused")
@@ -229,9 +230,9 @@ def _sources(known: Known, width: int) -> RenderableType:
 def _link(known: Known, link: LinkStatus) -> tuple[Text, str, Text, str]:
     style = "green" if link.state == "up" else "red" if link.state == "retrying" else "yellow"
     rate = known.message_rate(link)
-    bad = sum(link.malformed.values()) + link.dropped
     name = Text.assemble((link.name, "bold"), " ", (link.reason, "grey62"))
-    return name, "" if rate is None else f"{rate:.0f}/s", Text(link.state, style), f"{bad} bad" if bad else ""
+    refused = sum(link.malformed.values()) + link.dropped
+    return name, UNKNOWN if rate is None else f"{rate:.0f}", Text(link.state, style), str(refused)
 
 
 def _sensor(sensor: SensorStatus) -> tuple[Text, str, str, Text, str, str]:

@@ -96,13 +96,14 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Daemon]]:
     """Return what starts publishing processes; what still runs is killed with the test."""
     daemons: list[Daemon] = []
 
-    def _start(endpoint: str, vehicle: str = "mower") -> Daemon:
+    def _start(endpoint: str, vehicle: str = "mower", *, connect: bool = False) -> Daemon:
+        links = {"connect": {"endpoints": [endpoint]}, "listen": {"endpoints": ["tcp/127.0.0.1:0"]}}
         session = tmp_path / f"{vehicle}.json5"
         session.write_text(
             json.dumps(
                 {
                     "mode": "peer",
-                    "listen": {"endpoints": [endpoint]},
+                    **(links if connect else {"listen": {"endpoints": [endpoint]}}),
                     "scouting": {"multicast": {"enabled": False}},
                     "transport": {"shared_memory": {"enabled": False}},
                 }
