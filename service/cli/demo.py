@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -22,7 +23,11 @@ def command(
     seconds: Annotated[float, typer.Option(help="How long to drive.", min=5.0, max=86_400.0)] = 60.0,
     scenario: Annotated[
         str, typer.Option(help="Which course and sensors; beliefd scenario lists them.")
-    ] = "beacons",
+    ] = "demo",
+    picture: Annotated[
+        Path | None,
+        typer.Option(help="Write the live view as it was at the end there, as SVG.", show_default=False),
+    ] = None,
 ) -> None:
     """Drive a simulated rover over MAVLink and CAN, run the daemon, show its belief."""
     from service import kernels
@@ -30,4 +35,4 @@ def command(
     kernels.prepare()
     from service.view import demo
 
-    leave(demo.run(seconds, scenario))
+    leave(demo.run(seconds, scenario, picture))
