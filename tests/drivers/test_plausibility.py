@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import typing
 
 import pytest
 
@@ -22,6 +21,7 @@ from drivers.sample import (
     Pressure,
     Range,
 )
+from tests.drivers.examples import KINDS, fields, floating
 
 HALF = math.pi / 2
 
@@ -67,21 +67,12 @@ def test_what_cannot(reading: AnyReading, field: str) -> None:
     assert implausible(reading) == field
 
 
-@pytest.mark.parametrize("kind", typing.get_args(AnyReading), ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
 def test_no_number_of_any_reading_may_be_other_than_finite(kind: type[AnyReading], wrong: float) -> None:
-    """Every float field of every reading, one at a time, among zeros and ones."""
-    hints = typing.get_type_hints(kind)
-    names = kind.__struct_fields__
-    fine: dict[str, typing.Any] = {name: plain(hints[name]) for name in names}
-    floats = [name for name in names if "float" in str(hints[name])]
-    for name in floats:
-        value = wrong if not isinstance(fine[name], tuple) else (fine[name][0], wrong, *fine[name][2:])
+    """Every floating field of every reading, one at a time, in a reading that is otherwise plausible."""
+    fine = fields(kind)
+    assert implausible(kind(**fine)) is None
+    for name in floating(kind):
+        value = (0.5, wrong, 0.125) if isinstance(fine[name], tuple) else wrong
         assert implausible(kind(**{**fine, name: value})) == name
-
-
-def plain(hint: object) -> object:
-    text = str(hint)
-    if "tuple" in text:
-        return (0.5, 0.5, 0.5)
-    return True if "bool" in text else 1
