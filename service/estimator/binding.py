@@ -46,6 +46,16 @@ MAGNETIC_INTERVAL = SECOND // 5
 DEFAULT_SIGMA = {"position": 3.0, "velocity": 0.3, "range": 0.5, "heading": 0.1}
 """Used where neither the configuration nor the reading says how good it is: m, m/s, m, rad."""
 
+LEAST_SIGMA = {"position": 0.0, "velocity": 0.1, "range": 0.0, "heading": 0.02}
+"""What no reading is better than, whatever it claims: a receiver's velocity is filtered, and lags in turns."""
+
+CORRELATION = {"position": 1.0, "velocity": 1.0, "range": 0.0, "heading": 1.0}
+"""Seconds over which a sensor's errors stay alike. Readings closer together repeat each other's errors: each is given
+the variance that makes all of them together worth one independent reading per this time."""
+
+TIMING = 0.02
+"""Seconds by which a stamp may be off after its clock was mapped: at speed v, v times this many metres."""
+
 SPAN = {"position": 1000.0, "velocity": 100.0, "range": 2000.0, "heading": 2 * math.pi}
 """How far an outlier may lie from the truth, per dimension: m, m/s, m, rad."""
 
@@ -125,6 +135,7 @@ class BoundSensor:
         self.delay = round(settings.delay_ms * 1e6)
         self._measure = _MEASURES[settings.kind]
         self._last_magnetic = -(2**62)
+        self._last_time = -(2**62)
         self.model = model_of(settings)
         self._log_outlier = log_outlier_density(settings)
 
@@ -169,9 +180,23 @@ class BoundSensor:
         )
 
     def sigma(self, claimed: float | None) -> float:
-        """Return the larger of what the configuration and the reading say; both know of errors the other does not."""
+        """Return the larger of what the configuration and the reading say; each knows of errors the other does not."""
         known = [value for value in (self.settings.sigma, claimed) if value is not None and value > 0]
-        return max(known, default=DEFAULT_SIGMA[self.settings.kind])
+        return max(LEAST_SIGMA[self.settings.kind], max(known, default=DEFAULT_SIGMA[self.settings.kind]))
+
+    def spread(self, claimed: float | None, place: Place) -> float:
+        """Return the standard deviation to weigh a reading by: its sigma, its timing, and how alike its errors are."""
+        sigma = self.sigma(claimed)
+        if self.settings.kind in ("position", "range"):
+            sigma = math.hypot(sigma, TIMING * place.controls.speed(place.time))
+        return sigma * math.sqrt(self._repeats(place.time))
+
+    def _repeats(self, time: int) -> float:
+        """Return how many readings share one independent error, from the interval to the one before."""
+        correlation = CORRELATION[self.settings.kind]
+        interval = (time - self._last_time) / SECOND
+        self._last_time = time
+        return max(1.0, correlation / interval) if 0.0 < interval < correlation else 1.0
 
 
 def model_of(settings: Sensor) -> SensorModel[Any]:
@@ -215,7 +240,7 @@ def _measure_position(sensor: BoundSensor, reading: Any, place: Place) -> Any:
         return "no_origin"
     if not (math.isfinite(fix[0]) and math.isfinite(fix[1])):
         return "not_finite"
-    return PositionMeasurement(fix[0], fix[1], sensor.sigma(reading.sigma_horizontal))
+    return PositionMeasurement(fix[0], fix[1], sensor.spread(reading.sigma_horizontal, place))
 
 
 def _measure_velocity(sensor: BoundSensor, reading: Any, place: Place) -> Any:
@@ -224,7 +249,7 @@ def _measure_velocity(sensor: BoundSensor, reading: Any, place: Place) -> Any:
         return "not_finite"
     if abs(speed) < SLOWEST_COURSE:
         return "standing"
-    return VelocityMeasurement(reading.north, reading.east, speed, sensor.sigma(reading.sigma))
+    return VelocityMeasurement(reading.north, reading.east, speed, sensor.spread(reading.sigma, place))
 
 
 def _measure_range(sensor: BoundSensor, reading: Range, place: Place) -> Any:
@@ -234,17 +259,21 @@ def _measure_range(sensor: BoundSensor, reading: Range, place: Place) -> Any:
     if where is None:
         return "no_beacon"
     north, east, down = where
-    return RangeMeasurement(reading.distance, north, east, down - place.down, sensor.sigma(reading.sigma))
+    return RangeMeasurement(
+        reading.distance, north, east, down - place.down, sensor.spread(reading.sigma, place)
+    )
 
 
 def _measure_heading(sensor: BoundSensor, reading: Any, place: Place) -> Any:
     if isinstance(reading, Heading):
-        return HeadingMeasurement(reading.heading, sensor.sigma(reading.sigma))
+        return HeadingMeasurement(reading.heading, sensor.spread(reading.sigma, place))
     forward, right, _ = reading.magnetic_field
     if math.hypot(forward, right) < 1e-6:
         return "no_horizontal_field"
     magnetic = math.atan2(-right, forward)
-    return HeadingMeasurement(magnetic + math.radians(sensor.settings.declination_deg), sensor.sigma(None))
+    return HeadingMeasurement(
+        magnetic + math.radians(sensor.settings.declination_deg), sensor.spread(None, place)
+    )
 
 
 def beacon_position(

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from drivers.sample import (
@@ -89,6 +90,10 @@ class Track:
         total_start, unknown_start = self._at(start)
         total_end, unknown_end = self._at(end)
         return Motion(total_end - total_start, unknown_end - unknown_start)
+
+    def totals(self, times: Sequence[int]) -> list[float]:
+        """Return the total at each of ``times``, all from one beginning."""
+        return [self._at(time)[0] for time in times]
 
     def rate(self, time: int, window: int = SECOND // 10) -> float:
         """Return the mean rate over ``window`` about ``time``, per second."""
@@ -339,6 +344,14 @@ class Controls:
     def turn(self, start: int, end: int) -> Motion:
         """Return radians turned clockwise between two times, and the seconds of them without knowledge."""
         return self._turn.between(start, end)
+
+    def distances(self, times: Sequence[int]) -> list[float]:
+        """Return the metres rolled up to each of ``times``, from one beginning."""
+        return self._distance.totals(times)
+
+    def turns(self, times: Sequence[int]) -> list[float]:
+        """Return the radians turned up to each of ``times``, from one beginning."""
+        return self._turn.totals(times)
 
     def speed(self, time: int) -> float:
         """Return the forward speed about ``time``, m/s."""

@@ -50,6 +50,9 @@ POSITION_BIN = 0.25
 HEADING_BIN = 0.1
 """Sides of the bins that the KLD bound counts: metres and radians."""
 
+KLD_ERROR = 0.01
+"""Nats. The bins count the pose only; the slow states beside it want several particles in each of its bins."""
+
 DEMAND_INTERVAL = SECOND // 5
 GROWTH = 1.25
 """The set grows between resamplings only if the demand is this much larger than the count."""
@@ -97,6 +100,7 @@ class Estimator:
         self._demand_of = Demand(
             POSITION_BIN,
             HEADING_BIN,
+            error=KLD_ERROR,
             minimum=configuration.budget.particles_min,
             maximum=configuration.budget.particles_max,
         )

@@ -34,7 +34,7 @@ CLIMB = 0.05
 SENSOR_WALK = 1e-4
 """Per √s; how fast a sensor's scale or bias wanders."""
 
-CHORDS = 8
+CHORDS = 4
 """Into how many chords the way from the horizon to now is cut."""
 
 
@@ -86,12 +86,13 @@ class Vehicle:
     def displacement(self, start: int, end: int, biases: tuple[float, float]) -> Displacement:
         """Return the body's rigid motion from ``start`` to ``end``, corrected by (gyro bias, odometry scale)."""
         bias, scale = biases
+        marks = [start + (end - start) * chord // CHORDS for chord in range(CHORDS + 1)]
+        distances, turns = self.controls.distances(marks), self.controls.turns(marks)
+        drift = bias * (end - start) / SECOND / CHORDS
         forward = right = turn = 0.0
         for chord in range(CHORDS):
-            since = start + (end - start) * chord // CHORDS
-            until = start + (end - start) * (chord + 1) // CHORDS
-            step = self.controls.turn(since, until).total - bias * (until - since) / SECOND
-            distance = scale * self.controls.distance(since, until).total
+            step = turns[chord + 1] - turns[chord] - drift
+            distance = scale * (distances[chord + 1] - distances[chord])
             forward += distance * math.cos(turn + 0.5 * step)
             right += distance * math.sin(turn + 0.5 * step)
             turn += step
