@@ -55,7 +55,7 @@ def draw(seed: int) -> Scenario:
             *beacons.draw(seed).facts,
             SensorFacts("position", "bus", sigma=round(gnss.sigma, 3), outliers=0.02, delay_ms=90.0),
             SensorFacts("velocity", "bus", sigma=gnss.velocity_noise, outliers=0.02, delay_ms=90.0),
-            # The needle's error lasts for many readings: its sigma is told larger, as if they were independent.
+            # The needle's error lasts for many readings; told larger, they count as if independent.
             SensorFacts(
                 "heading",
                 "autopilot",

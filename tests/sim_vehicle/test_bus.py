@@ -1,4 +1,4 @@
-"""The bus's frames, put together and decoded again by the dronecan package, and one transfer packed by hand."""
+"""The bus's frames, decoded again by the dronecan package, and one transfer packed by hand."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def test_every_node_says_that_it_is_well() -> None:
 
 
 def test_a_single_frame_transfer_is_as_packed_by_hand() -> None:
-    """NodeStatus: uptime uint32, then health, mode, sub mode (2 + 3 + 3 bits), vendor code, tail 0xC0 + transfer."""
+    """NodeStatus: uptime (4 bytes), health, mode, sub mode (1), vendor code (2), tail 0xC0 + transfer."""
     status = message(
         "uavcan.protocol.NodeStatus", uptime_sec=0x01020304, health=0, mode=0, vendor_specific_status_code=0
     )

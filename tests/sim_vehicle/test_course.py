@@ -9,6 +9,7 @@ import pytest
 from sim_vehicle.course import Course, CourseDriver, Waypoint
 from sim_vehicle.rover import AckermannRover, Rover, SkidRover
 from sim_vehicle.world import Pose, Truth, World
+import itertools
 
 SQUARE = (
     Waypoint(20.0, 0.0, 1.5),
@@ -48,7 +49,7 @@ def test_the_rover_waits_before_it_departs_and_keeps_to_the_leg_speed() -> None:
 
 def test_the_path_is_smooth() -> None:
     drive = driven(SkidRover(yaw_acceleration=1.5), 100.0)
-    for before, after in zip(drive, drive[1:], strict=False):
+    for before, after in itertools.pairwise(drive):
         assert abs(after.yaw_rate - before.yaw_rate) <= 1.5 * 0.05 + 1e-9
         assert abs(after.speed - before.speed) <= 0.8 * 0.05 + 1e-9
     assert max(abs(truth.yaw_rate) for truth in drive) <= 0.7 + 1e-9

@@ -15,6 +15,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from tests.sim_vehicle.listening import LONGEST_WAIT, Companion, is_a
+import itertools
 
 
 @pytest.fixture
@@ -73,8 +74,7 @@ def test_an_interval_is_accepted_and_kept_over_udp(start, companion: Companion) 
     stamps = [companion.wait_for(is_a("HIGHRES_IMU")).time_usec for _ in range(4)]
     # By the vehicle's own stamps, so that a busy machine changes nothing.
     assert all(
-        after - before == pytest.approx(100_000, abs=11_000)
-        for before, after in zip(stamps, stamps[1:], strict=False)
+        after - before == pytest.approx(100_000, abs=11_000) for before, after in itertools.pairwise(stamps)
     )
     companion.say(mavlink.MAVLink_command_long_message(1, 1, command, 0, 9000, 50_000.0, 0, 0, 0, 0, 0))
     assert companion.wait_for(is_a("COMMAND_ACK")).result == mavlink.MAV_RESULT_DENIED

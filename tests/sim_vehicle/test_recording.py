@@ -36,7 +36,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(folder: Path
 
 
 def test_the_telemetry_log_is_stamped_in_the_order_of_arrival(folder: Path) -> None:
-    """Read as MAVLink ground stations do: eight bytes of microseconds, then one frame of the length that it says."""
+    """Read as ground stations do: eight bytes of microseconds, then a frame of the length that it says."""
     data, place, stamps, kinds = (folder / "one.tlog").read_bytes(), 0, [], set()
     parser = mavlink.MAVLink(None)
     while place < len(data):

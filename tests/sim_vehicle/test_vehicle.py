@@ -88,7 +88,7 @@ def test_messages_agree_with_the_truth_within_their_scaling_and_noise() -> None:
         distance = ((truth.north - site.north) ** 2 + (truth.east - site.east) ** 2 + site.down**2) ** 0.5
         errors.append(message.range / 1e3 - distance)
     errors.sort()
-    # 2 % come long; half of the errors lie within 0.67 sigma of zero: 0.2 m, and wide of that with 380 ranges.
+    # 2 % come long; a quarter of the errors lies above 0.67 sigma, 0.2 m: wide bounds for 380 ranges.
     assert len(errors) > 350
     assert abs(errors[len(errors) // 2]) < 0.1
     assert 0.1 < errors[3 * len(errors) // 4] < 0.3

@@ -25,7 +25,7 @@ def test_frames_arrive_in_order_and_never_before_the_latency() -> None:
 
 
 def test_the_mean_delay_is_latency_and_jitter() -> None:
-    """Far apart, frames do not wait for each other; 5,000 gamma delays: sigma of the mean 0.0001 s, bound 5 sigma."""
+    """Far apart, frames do not wait for each other; 5,000 gamma delays, bound five sigma of the mean."""
     line = wire(WireSettings(latency=0.002, jitter=0.01))
     delays = [line.carry(float(time), b"x")[0].time - time for time in range(5000)]
     assert np.mean(delays) == pytest.approx(0.012, abs=5.0 * 0.01 / math.sqrt(2.0 * 5000))

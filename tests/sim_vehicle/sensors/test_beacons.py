@@ -24,7 +24,7 @@ def test_beacons_answer_in_turn_with_the_distance_in_three_dimensions() -> None:
 
 
 def test_noise_and_outliers_have_the_statistics_of_the_settings() -> None:
-    """20,000 ranges: shares and spread within five sigma. A detour longer than 1.5 m has probability exp(-1.5 / 4)."""
+    """20,000 ranges: shares and spread within five sigma; a detour exceeds 1.5 m with exp(-1.5 / 4)."""
     settings = RangerSettings(CADENCE, SITES[:1], sigma=0.3, outliers=0.1, outlier_mean=4.0)
     ranger = Ranger(settings, stream(2, "r"))
     errors = np.array(

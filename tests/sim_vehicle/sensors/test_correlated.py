@@ -12,7 +12,7 @@ from sim_vehicle.sensors.correlated import Wander
 
 
 def test_spread_and_memory_are_those_of_the_settings() -> None:
-    """4,000 independent paths: variance within 5 sigma (2 sqrt(2/N) sigma² …), correlation within 5/sqrt(N)."""
+    """4,000 independent paths: variance within 5 sqrt(2/N) of its own, correlation within 5/sqrt(N)."""
     count, chance = 4000, stream(1, "wander")
     paths = np.array(
         [[path.at(10.0), path.at(17.0)] for path in (Wander(0.5, 20.0, chance) for _ in range(count))]

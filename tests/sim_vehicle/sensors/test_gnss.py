@@ -16,7 +16,7 @@ CADENCE = Cadence(5.0)
 
 
 def test_errors_are_as_large_as_claimed() -> None:
-    """2,000 receivers: normalised errors have variance 1; five sigma of a variance over n values is 5 sqrt(2/n)."""
+    """2,000 receivers: normalised errors have variance 1; bounds of five sigma, 5 sqrt(2/n)."""
     settings = GnssSettings(CADENCE, wander=0.3, noise=0.2, velocity_noise=0.1, dilution_spread=0.3)
     horizontal, vertical, velocity = [], [], []
     for seed in range(2000):

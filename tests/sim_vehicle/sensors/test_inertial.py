@@ -24,7 +24,7 @@ def test_a_perfect_unit_feels_the_turn_and_gravity() -> None:
 
 
 def test_bias_and_white_noise_are_those_of_the_settings() -> None:
-    """10,000 readings: five sigma of a mean and of a standard deviation; by chance rarer than 10^-5 over six axes."""
+    """10,000 readings: five sigma of means and deviations; by chance rarer than 10^-5."""
     settings = InertialSettings(
         CADENCE,
         gyro_bias=(0.01, -0.02, 0.005),
@@ -43,7 +43,7 @@ def test_bias_and_white_noise_are_those_of_the_settings() -> None:
 
 
 def test_the_bias_walks_with_the_root_of_time() -> None:
-    """500 units, 3 axes: the variance after 100 s is walk² · 100; five sigma of a variance of 1,500 values."""
+    """500 units, 3 axes: the variance after 100 s is walk² · 100; five sigma of 1,500 values."""
     settings = InertialSettings(CADENCE, gyro_bias_walk=1e-4)
     ends = []
     for seed in range(500):

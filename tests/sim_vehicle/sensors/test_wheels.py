@@ -33,7 +33,7 @@ def test_the_counters_hold_whole_ticks_and_run_backwards_with_the_wheels() -> No
 
 
 def test_slip_has_the_spread_of_the_settings() -> None:
-    """Correlated slip over T: the distance's sigma is slip v sqrt(2 tau T) for T ≫ tau; 300 drives, 5 sigma of a sigma."""
+    """The distance's sigma is slip v sqrt(2 tau (T - tau)) for T ≫ tau; 300 drives, five sigma."""
     drives = []
     for seed in range(300):
         wheels = Wheels(
