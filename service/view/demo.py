@@ -32,6 +32,7 @@ from service.view.truth import TruthTail
 from service.view.verdict import Record, Verdict, judge
 
 FAILED = 1
+WRONG_USE = 2
 SEED = 1
 
 _START = 60.0
@@ -71,15 +72,18 @@ def run(seconds: float, scenario: str, picture: Path | None = None) -> int:
     closed = True
     verdict: Verdict | None = None
     try:
-        if warm():
-            return FAILED
         with stage(scenario, SEED) as put_up:
+            if warm():
+                raise _DemoError("the kernels could not be compiled")
             session = _opened(put_up)
             try:
                 verdict = _Watch(put_up, session, console).through(seconds, picture)
             finally:
                 closed = close(session, _CLOSING)
-    except (StageError, _DemoError) as error:
+    except StageError as error:
+        errors.print(f"beliefd demo: {error}", style="red", markup=False, highlight=False)
+        return WRONG_USE
+    except _DemoError as error:
         errors.print(f"beliefd demo: {error}", style="red", markup=False, highlight=False)
     except KeyboardInterrupt:
         errors.print("beliefd demo: interrupted; everything is stopped")

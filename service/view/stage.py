@@ -146,7 +146,11 @@ def stage(scenario: str, seed: int) -> Generator[Stage]:
         try:
             yield put_up
         finally:
+            patient = signal.signal(
+                signal.SIGINT, signal.SIG_IGN
+            )  # a second Ctrl-C must not leave half of it
             put_up.stop()
+            signal.signal(signal.SIGINT, patient)
 
 
 def warm() -> int:
