@@ -73,8 +73,6 @@ def run(seconds: float, scenario: str, picture: Path | None = None) -> int:
     verdict: Verdict | None = None
     try:
         with stage(scenario, SEED) as put_up:
-            if warm():
-                raise _DemoError("the kernels could not be compiled")
             session = _opened(put_up)
             try:
                 verdict = _Watch(put_up, session, console).through(seconds, picture)
@@ -97,6 +95,8 @@ def run(seconds: float, scenario: str, picture: Path | None = None) -> int:
 
 
 def _opened(put_up: Stage) -> zenoh.Session:
+    if warm():
+        raise _DemoError("the kernels could not be compiled")
     put_up.start_daemon()
     deadline = time.monotonic() + _START
     while True:
