@@ -21,26 +21,31 @@ from drivers.sample import LinkReport, Sample
 STAMP = 8
 MICROSECOND = 1_000  # ns
 LONGEST_GAP = 60_000_000  # µs: further on, the next stamp decides whether this one is damaged
+LARGEST_STAMP = 2**63 // 1_000 - 1  # µs: beyond it nanoseconds fit no 64 bits; the year 2262
+OUT_OF_ORDER = 1_000_000  # µs: so little back is two writers of one log, not a clock that was set
 
 
 class ReceiveClock:
     """The log's receive clock, kept from running back.
 
-    A stamp out of line whose successor is in line again is damaged: the last one is used. A step back that
-    lasts (the clock was set) is taken out: time goes on from there.
+    A stamp out of line whose successor is in line again is damaged: the last one is used, as for one that is
+    only a little behind. A longer step back that lasts (the clock was set) is taken out: time goes on from
+    there.
+
+    Parameters
+    ----------
+    stamps : list[int]
+        The first stamps of the log, microseconds, at best three: if one is damaged, the others overrule it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, stamps: list[int]) -> None:
         self.faults: Counter[str] = Counter()
-        self._last: int | None = None
         self._shift = 0
+        middle = sorted(stamps)[len(stamps) // 2]
+        self._last = min(stamp for stamp in stamps if abs(stamp - middle) <= LONGEST_GAP)
 
     def read(self, stamp: int, following: int | None) -> int:
         """Return the time of arrival in nanoseconds; ``following`` is the log's next stamp, if any."""
-        if self._last is None:
-            damaged = following is not None and not 0 <= following - stamp <= LONGEST_GAP
-            self._last = following if damaged and following is not None and following < stamp else stamp
-            return self._last * MICROSECOND
         time = stamp + self._shift
         if not 0 <= time - self._last <= LONGEST_GAP:
             time = self._judge(time, following)
@@ -48,15 +53,16 @@ class ReceiveClock:
         return time * MICROSECOND
 
     def _judge(self, time: int, following: int | None) -> int:
-        last = self._last or 0
+        last = self._last
         if following is not None and 0 <= following + self._shift - last <= LONGEST_GAP:
             self.faults["bad_stamp"] += 1
             return last
-        if time < last:
+        if time > last:
+            return time
+        if last - time > OUT_OF_ORDER:
             self.faults["clock_step"] += 1
             self._shift += last - time
-            return last
-        return time
+        return last
 
 
 class TlogReader:
@@ -80,7 +86,7 @@ class TlogReader:
 
     def _begin(self) -> None:
         self._decoder = Decoder(self._link, self._settings)
-        self._clock = ReceiveClock()
+        self._clock: ReceiveClock | None = None
         self._faults: Counter[str] = Counter()
         self._kinds: Counter[int] = Counter()
         self._position = 0
@@ -126,10 +132,12 @@ class TlogReader:
                 self._faults[Fault.UNKNOWN] += 1
 
     def _received(self, data: mmap.mmap, at: int, frame: Frame) -> int:
-        stamp = int.from_bytes(data[at : at + STAMP], "big")
+        """Return when the frame of the entry at ``at`` arrived, nanoseconds."""
         end = at + STAMP + len(frame.raw)
-        following = data[end : end + STAMP]
-        return self._clock.read(stamp, int.from_bytes(following, "big") if len(following) == STAMP else None)
+        if self._clock is None:
+            self._clock = ReceiveClock(_stamps(data, at, 3))
+        following = _stamp(data, end) if end + STAMP <= len(data) else None
+        return self._clock.read(_stamp(data, at), following)
 
     def _resynchronise(self, data: mmap.mmap, at: int, fault: Frame | Fault) -> int:
         """Return where the next good entry starts; count the stretch once, and its bytes."""
@@ -149,13 +157,14 @@ class TlogReader:
         decoder = self._decoder
         clocks = decoder.main_clocks
         wanted = sum(count for identifier, count in self._kinds.items() if identifier in decoder.wanted)
+        stamps = Counter[str]() if self._clock is None else self._clock.faults
         unwanted = self._kinds.total() - wanted - self._faults[Fault.UNKNOWN]
         return LinkReport(
             self._link,
             "up",
             messages=decoder.messages,
             samples=decoder.samples,
-            malformed=dict(self._faults + self._clock.faults + decoder.malformed),
+            malformed=dict(self._faults + stamps + decoder.malformed),
             ignored=unwanted + decoder.ignored.total(),
             opened=1,
             clock=clocks.boot.method if clocks else "",
@@ -175,3 +184,16 @@ def _followed(data: mmap.mmap, at: int, frame: Frame) -> bool:
     """Whether an unknown message is believed: the log ends after it, or an entry follows."""
     marker = at + STAMP + len(frame.raw) + STAMP
     return marker - STAMP == len(data) or data[marker : marker + 1] in (b"\xfd", b"\xfe")
+
+
+def _stamp(data: mmap.mmap, at: int) -> int:
+    return min(int.from_bytes(data[at : at + STAMP], "big"), LARGEST_STAMP)
+
+
+def _stamps(data: mmap.mmap, at: int, count: int) -> list[int]:
+    """Return the stamps of up to ``count`` entries that follow one another from ``at``."""
+    stamps: list[int] = []
+    while len(stamps) < count and isinstance(frame := frame_at(data, at + STAMP), Frame):
+        stamps.append(_stamp(data, at))
+        at += STAMP + len(frame.raw)
+    return stamps
