@@ -31,10 +31,10 @@ from sim_vehicle.world import Truth
 UTC = 2
 """gnss.Fix2.gnss_time_standard."""
 _ESC_FULL_SCALE = 8191
-_SPEED_COMMAND = 2
-"""actuator.Command.command_type: speed, here of a wheel's rim, m/s."""
-_LIDAR, _READING_VALID, _DOWNWARD = 2, 0, (0, -8, 0)
-"""range_sensor.Measurement: sensor and reading type; roll, pitch, yaw of the beam in steps of 12 degrees."""
+_UNITLESS_COMMAND = 0
+"""actuator.Command.command_type: a share of full speed, -1 to 1."""
+_LIDAR, _READING_VALID, _DOWNWARD = 2, 1, (0, -6, 0)
+"""range_sensor.Measurement: sensor and reading type; roll, pitch, yaw of the beam in steps of 15 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,16 +184,17 @@ class Bus:
             self._broadcast(now, node, value)
         command, half = truth.command, 0.5 * track * truth.command.yaw_rate
         asked = (command.speed + half, command.speed - half)
-        raw = [round(_ESC_FULL_SCALE * min(1.0, max(-1.0, speed / FULL_SPEED))) for speed in asked]
+        shares = [min(1.0, max(-1.0, speed / FULL_SPEED)) for speed in asked]
+        raw = [round(_ESC_FULL_SCALE * share) for share in shares]
         self._broadcast(now, self._autopilot, message("uavcan.equipment.esc.RawCommand", cmd=raw))
         actuators = [
             message(
                 "uavcan.equipment.actuator.Command",
                 actuator_id=index,
-                command_type=_SPEED_COMMAND,
-                command_value=speed,
+                command_type=_UNITLESS_COMMAND,
+                command_value=share,
             )
-            for index, speed in enumerate(asked)
+            for index, share in enumerate(shares)
         ]
         self._broadcast(
             now, self._autopilot, message("uavcan.equipment.actuator.ArrayCommand", commands=actuators)

@@ -110,7 +110,7 @@ def test_the_other_sensors_survive_the_half_floats() -> None:
     assert list(mag.magnetic_field_ga) == pytest.approx([0.2, -0.01, 0.44], rel=1e-3)
     assert (baro.static_pressure, baro.static_pressure_variance) == pytest.approx((95_012.5, 9.0))
     assert clearance.range == pytest.approx(0.35, rel=1e-3)
-    assert (clearance.sensor_type, clearance.reading_type) == (2, 0)
+    assert (clearance.sensor_type, clearance.reading_type) == (2, 1)
 
 
 def test_motors_say_their_revolutions_and_what_they_were_asked() -> None:
@@ -127,7 +127,11 @@ def test_motors_say_their_revolutions_and_what_they_were_asked() -> None:
     assert [(item[2].esc_index, item[2].rpm) for item in (left, right)] == [(0, 105), (1, 86)]
     assert list(raw[2].cmd) == [round(8191 * 1.6 / 3.0), round(8191 * 1.4 / 3.0)]
     assert [command.actuator_id for command in array[2].commands] == [0, 1]
-    assert [command.command_value for command in array[2].commands] == pytest.approx([1.6, 1.4], rel=1e-3)
+    shares = [command.command_value for command in array[2].commands]
+    assert shares == pytest.approx([1.6 / 3.0, 1.4 / 3.0], rel=1e-3)
+        [1.6 / 3.0, 1.4 / 3.0], rel=1e-3
+    )
+    assert {command.command_type for command in array[2].commands} == {0}
 
 
 def test_every_node_says_that_it_is_well() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -9,7 +10,6 @@ import pytest
 from sim_vehicle.course import Course, CourseDriver, Waypoint
 from sim_vehicle.rover import AckermannRover, Rover, SkidRover
 from sim_vehicle.world import Pose, Truth, World
-import itertools
 
 SQUARE = (
     Waypoint(20.0, 0.0, 1.5),

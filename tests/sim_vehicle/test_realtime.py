@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import signal
 import subprocess
 import sys
@@ -15,7 +16,6 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from tests.sim_vehicle.listening import LONGEST_WAIT, Companion, is_a
-import itertools
 
 
 @pytest.fixture
