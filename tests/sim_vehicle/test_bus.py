@@ -129,8 +129,6 @@ def test_motors_say_their_revolutions_and_what_they_were_asked() -> None:
     assert [command.actuator_id for command in array[2].commands] == [0, 1]
     shares = [command.command_value for command in array[2].commands]
     assert shares == pytest.approx([1.6 / 3.0, 1.4 / 3.0], rel=1e-3)
-        [1.6 / 3.0, 1.4 / 3.0], rel=1e-3
-    )
     assert {command.command_type for command in array[2].commands} == {0}
 
 
