@@ -1,16 +1,20 @@
 """The governor: how many particles the next tick can pay for.
 
-Cost model, affine in the count: ``cost = fixed + per_particle * count``. ``fixed`` sums the running high
-quantiles of the stages that do not depend on the particles (ingest, publishing); ``per_particle`` sums those
-of the other stages' cost divided by their count. Motion, sensing, resampling *and* extraction are paid from
-the budget as if each of them ran in every tick, whether or not the last one needed it: the tick that does
-need all of them must fit too. The sum of the stages' quantiles lies above the quantile of their sum whenever
-they do not peak together.
+Every stage that works on particles has a *shape*, ``overhead + per_particle * count``, measured once on this
+machine before the first tick (:mod:`service.rehearsal`). What it costs in operation is told as a multiple of
+its shape at the count it worked on; the running high quantile of that multiple is the stage's *scale*. A
+machine that slows down, or a vehicle with more readings per tick than the rehearsal had, moves the scale, and
+with it the whole line.
 
-``supply = (budget - fixed) / per_particle``. The overhead of a call hides in ``per_particle`` when the count
-is small, so a first answer from a small count is too low; but each answer is exact at the count it was
-measured at, so the iteration climbs to the one count whose true cost is the budget, from either side, and
-stays there.
+So the cost model is affine, ``cost = fixed + per_particle * count``: ``fixed`` sums the quantiles of the
+stages that do not depend on particles (ingest, publishing) and the others' scaled overheads, ``per_particle``
+sums their scaled slopes, and ``supply = (budget - fixed) / per_particle``. Motion, sensing, resampling *and*
+extraction are paid from the budget as if each of them ran in every tick, whether or not the last one needed
+it: the tick that does must fit, too. The sum of the stages' quantiles lies above the quantile of their sum
+whenever they do not peak together.
+
+The model is exact at the count it was measured at, whatever the shape: scale times shape is the cost. A wrong
+shape only makes the way to the right count longer.
 
 The count does not hunt: it shrinks at once when the supply falls below it, and grows by at most a tenth per
 tick, only while the supply is clearly above it, and never quite up to it.
@@ -22,6 +26,7 @@ threads that help have. Being preempted shows in the lateness, which is wall tim
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -33,15 +38,28 @@ GROWTH = 1.1
 HEADROOM = 0.9
 """Growth stops at this share of the supply; between it and the supply the count stays as it is."""
 
-FIRST_GUESS = 50e-9
-"""Seconds per particle and tick until measured: eight times the figure of a desktop processor."""
-
 
 class Level(IntEnum):
     """How far a tick was degraded, in the declared order; the loop's governor decides the first two."""
 
     FULL = 0
     FEWER_PARTICLES = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """How the cost of a stage depends on the count: seconds per tick, and seconds per particle and tick."""
+
+    overhead: float
+    per_particle: float
+
+    def at(self, count: int) -> float:
+        """Return the cost at ``count`` particles, seconds."""
+        return self.overhead + self.per_particle * count
+
+
+PROPORTIONAL = Shape(0.0, 1.0)
+"""Of a stage that nobody has measured: its whole cost is taken to grow with the count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +91,8 @@ class Governor:
         Seconds per tick, for everything the loop does.
     smallest, largest : int
         Bounds of the count, whatever the budget says.
+    shapes : Mapping[str, Shape]
+        Of the stages that work on particles, as far as they were measured.
 
     Raises
     ------
@@ -80,7 +100,7 @@ class Governor:
         The budget is not positive, or the bounds are not in order.
     """
 
-    def __init__(self, budget: float, smallest: int, largest: int) -> None:
+    def __init__(self, budget: float, smallest: int, largest: int, shapes: Mapping[str, Shape]) -> None:
         if budget <= 0.0:
             raise ValueError(f"the budget must be more than 0 seconds per tick, got {budget}")
         if not 1 <= smallest <= largest:
@@ -88,8 +108,9 @@ class Governor:
         self._budget = budget
         self._smallest = smallest
         self._largest = largest
+        self._shapes = dict(shapes)
+        self._scales = {stage: _expecting(1.0) for stage in shapes}
         self._fixed: dict[str, RunningQuantile] = {}
-        self._per_particle: dict[str, RunningQuantile] = {}
         self._limit = self._clamped(self.supply)
 
     def observe(self, stage: str, seconds: float, count: int) -> None:
@@ -104,22 +125,26 @@ class Governor:
         count : int
             Particles it worked on; 0 for a stage whose cost does not depend on them.
         """
-        table, cost = (self._per_particle, seconds / count) if count > 0 else (self._fixed, seconds)
-        if stage not in table:
-            table[stage] = RunningQuantile(WINDOW, PROBABILITY)
-        table[stage].add(cost)
+        if count <= 0:
+            if stage not in self._fixed:
+                self._fixed[stage] = _expecting(0.0)
+            self._fixed[stage].add(seconds)
+            return
+        if stage not in self._scales:
+            self._shapes[stage] = PROPORTIONAL
+            self._scales[stage] = RunningQuantile(WINDOW, PROBABILITY)
+        self._scales[stage].add(seconds / self._shapes[stage].at(count))
 
     @property
     def fixed(self) -> float:
         """Seconds per tick that do not depend on the count."""
-        return sum(cost.value for cost in self._fixed.values())
+        overheads = (self._shapes[stage].overhead * scale.value for stage, scale in self._scales.items())
+        return sum(cost.value for cost in self._fixed.values()) + sum(overheads)
 
     @property
     def per_particle(self) -> float:
-        """Seconds per particle and tick; at least :data:`FIRST_GUESS` until a window was measured."""
-        measured = sum(cost.value for cost in self._per_particle.values())
-        seen = max((len(cost) for cost in self._per_particle.values()), default=0)
-        return measured if seen >= WINDOW else max(measured, FIRST_GUESS)
+        """Seconds per particle and tick."""
+        return sum(self._shapes[stage].per_particle * scale.value for stage, scale in self._scales.items())
 
     @property
     def supply(self) -> float:
@@ -141,3 +166,11 @@ class Governor:
 
     def _clamped(self, count: float) -> float:
         return min(max(count, float(self._smallest)), float(self._largest))
+
+
+def _expecting(value: float) -> RunningQuantile:
+    """Return a quantile with a past: what is known beforehand, so that one early exception does not rule."""
+    quantile = RunningQuantile(WINDOW, PROBABILITY)
+    for _ in range(WINDOW):
+        quantile.add(value)
+    return quantile

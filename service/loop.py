@@ -7,7 +7,7 @@ is a datagram on a queue that the kernel bounds; what a queue refuses is counted
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
 import msgspec
@@ -19,7 +19,7 @@ from service.budget import Meters
 from service.channels import BUDGET, ESTIMATE, HEALTH, SENSORS, Heart, Outlet, cloud
 from service.config import Configuration
 from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Sensors, SensorStatus
-from service.governor import Governor
+from service.governor import Governor, Shape
 from service.inlet import Inlet
 from service.schedule import NANOSECONDS, Schedule
 
@@ -80,6 +80,8 @@ class Loop:
         Queue to the publisher.
     heart : Heart
         Line to the supervisor.
+    shapes : Mapping[str, Shape]
+        What the stages cost in the rehearsal, for the governor to start from.
     """
 
     def __init__(
@@ -90,6 +92,7 @@ class Loop:
         inlets: Sequence[Inlet],
         outlet: Outlet,
         heart: Heart,
+        shapes: Mapping[str, Shape],
     ) -> None:
         self._rate = configuration.loop.rate
         self._budget_ms = configuration.budget.cpu_ms
@@ -99,9 +102,8 @@ class Loop:
         self._inlets = inlets
         self._outlet = outlet
         self._heart = heart
-        self._governor = Governor(
-            self._budget_ms * 1e-3, configuration.budget.particles_min, configuration.budget.particles_max
-        )
+        bounds = configuration.budget.particles_min, configuration.budget.particles_max
+        self._governor = Governor(self._budget_ms * 1e-3, *bounds, shapes)
         slices = max(1, len(inlets))
         self._slice_ns = round(INGEST_SHARE * self._budget_ms * 1e-3 * NANOSECONDS / slices)
         self._second = max(1, round(self._rate))

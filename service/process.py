@@ -72,7 +72,7 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
     from service.rehearsal import rehearse
 
     heart.announce("rehearsing")
-    rehearse(configuration)
+    shapes = rehearse(configuration)
     meters = Meters(configuration.loop.rate)
     links = (argument.rpartition("=") for argument in arguments.link)
     loop = Loop(
@@ -82,6 +82,7 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
         [Inlet(name, inherited(int(descriptor))) for name, _, descriptor in links],
         Outlet(inherited(arguments.publisher)),
         heart,
+        shapes,
     )
     stopped = _stop_flag()
     for refusal in punctual(configuration.loop.priority, configuration.loop.cpus):

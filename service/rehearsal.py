@@ -1,12 +1,14 @@
 """A dry run before the first tick: each kernel, import and page that a tick needs is touched once.
 
-A throw-away estimator of the same configuration is fed one second of invented readings, for each sensor that
-is configured, and its estimates are encoded. Nothing of it is published or kept.
+Throw-away estimators of the same configuration, one with few particles and one with many, are fed invented readings
+for each sensor that is configured. What the stages cost at the two counts is their shape on this machine, from which
+the governor starts. Nothing else of it is kept, and nothing published.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from statistics import median
 
 import msgspec
 
@@ -18,37 +20,73 @@ from drivers.sample import (
     Range,
     Rotation,
     Sample,
+    SampleBatch,
     Velocity,
     decode,
     encode,
 )
-from drivers.sample import SampleBatch as Batch
+from service.budget import Meters
 from service.config import Configuration, Sensor, Start
 from service.estimator import Estimator
+from service.governor import Shape
+
+PARTICLE_STAGES = ("motion", "sensing", "resampling", "extraction")
+
+MANY = 20_000
+"""Particles of the large rehearsal, where the configuration allows so many."""
 
 _TICKS = 50
+_WARM = 20
 _PERIOD_NS = 20_000_000
 _SPEED = 1.0
+_LEAST = 1e-11
+"""Seconds per particle below which no slope is believed: the fastest kernel needs more for one load."""
 
 
-def rehearse(configuration: Configuration) -> int:
-    """Run a second of ticks on a throw-away estimator; return how many particles the last one had."""
+def rehearse(configuration: Configuration) -> dict[str, Shape]:
+    """Run a second of ticks with few and with many particles; return the shape of every stage that ran."""
+    few = configuration.budget.particles_min
+    many = min(configuration.budget.particles_max, max(MANY, 2 * few))
+    cheap, dear = _costs(configuration, few), _costs(configuration, many)
+    return {
+        stage: _line(few, cheap[stage], many, dear[stage])
+        for stage in PARTICLE_STAGES
+        if cheap[stage] > 0.0 and dear[stage] > 0.0
+    }
+
+
+def _line(few: int, cheap: float, many: int, dear: float) -> Shape:
+    """Return the line through two points; where it would fall or start below zero, the nearest that does not."""
+    if many == few:
+        return Shape(0.0, max(dear / many, _LEAST))
+    slope = min(max((dear - cheap) / (many - few), _LEAST), dear / many)
+    return Shape(max(dear - slope * many, 0.0), slope)
+
+
+def _costs(configuration: Configuration, count: int) -> dict[str, float]:
+    """Return the median cost of every stage at ``count`` particles, over the ticks in which it ran."""
+    meters = Meters(_TICKS)
     start = Start(mode="given", position=(0.0, 0.0, 0.0), heading=0.0, sigma_heading=0.1)
-    estimator = Estimator(configuration.model_copy(update={"start": start}))
+    budget = configuration.budget.model_copy(update={"particles_min": count, "particles_max": count})
+    estimator = Estimator(configuration.model_copy(update={"start": start, "budget": budget}), meters)
     encoder = msgspec.json.Encoder()
-    particles = 0
+    seconds: dict[str, list[float]] = {stage: [] for stage in PARTICLE_STAGES}
     now = 0
     for tick in range(_TICKS):
         now = 1_000_000_000 + tick * _PERIOD_NS
-        datagram = decode(encode(Batch(list(_samples(configuration, now)))))
-        if isinstance(datagram, Batch):
+        meters.begin()
+        datagram = decode(encode(SampleBatch(list(_samples(configuration, now)))))
+        if isinstance(datagram, SampleBatch):
             estimator.ingest(datagram.samples)
-        estimate = estimator.tick(now, now, configuration.budget.particles_max)
-        encoder.encode(estimate)
-        particles = estimate.particles
+        meters.lap("ingest")
+        encoder.encode(estimator.tick(now, now, count))
+        meters.end(0.0, 0.0)
+        for stage, costs in seconds.items():
+            if tick >= _WARM and meters.costs[stage] > 0.0:
+                costs.append(meters.costs[stage])
     encoder.encode(estimator.sensors(now))
     estimator.cloud(configuration.publish.particles)
-    return particles
+    return {stage: median(costs) if costs else 0.0 for stage, costs in seconds.items()}
 
 
 def _samples(configuration: Configuration, time: int) -> Iterator[Sample]:
