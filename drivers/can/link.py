@@ -94,6 +94,9 @@ class CanLink:
         """The bus in words, for messages."""
         return f"{self._settings.interface} {self._settings.channel}"
 
+    def _remedy(self, error: Exception, otherwise: str) -> str:
+        return _REMEDIES.get(_code(error) or 0, otherwise).replace("CHANNEL", self._settings.channel)
+
     def open(self) -> None:
         """Open the bus and let only the wanted messages through.
 
@@ -106,7 +109,7 @@ class CanLink:
         try:
             self._bus = self._open_bus()
         except (can.CanError, OSError, ImportError, ValueError, TypeError, RuntimeError) as error:
-            remedy = _REMEDIES.get(_code(error) or 0, _OPEN_REMEDY)
+            remedy = self._remedy(error, _OPEN_REMEDY)
             if isinstance(error, NotImplementedError):  # unknown to python-can, or its driver is missing
                 known = ", ".join(sorted({MULTICAST, *can.VALID_INTERFACES}))
                 remedy = f"interface should be one of {known}, with its driver installed"
@@ -198,7 +201,7 @@ class CanLink:
             raise LinkError(
                 f"{self._name}: {self.place} brings only damaged frames: {error}; check bitrate and interface"
             ) from error
-        remedy = _REMEDIES.get(_code(error) or 0, _READ_REMEDY)
+        remedy = self._remedy(error, _READ_REMEDY)
         raise LinkError(f"{self._name}: {self.place} broke: {error}; {remedy}") from error
 
     def _count_error(self, message: can.Message) -> None:

@@ -162,12 +162,10 @@ class Reassembler:
             return None
         payload = bytes(slot.payload)
         if not single:
-            if int.from_bytes(payload[:2], "little") != binascii.crc_hqx(
-                payload[2:], data_type.checksum_start
-            ):
+            checksum, payload = int.from_bytes(payload[:2], "little"), payload[2:]
+            if checksum != binascii.crc_hqx(payload, data_type.checksum_start):
                 self._abandon(slot, "bad_checksum")
                 return None
-            payload = payload[2:]
         slot.active = False
         slot.abandoned = -1
         return Transfer(data_type, source, payload, frame.flexible, slot.started_ns)

@@ -172,6 +172,14 @@ def test_a_zipped_file_cut_short_gives_what_is_there(tmp_path: Path) -> None:
     assert damaged.report().malformed["truncated_file"] == 1
 
 
+def test_a_zipped_file_that_is_damaged_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "damaged.log.gz"
+    path.write_bytes(gzip.compress(b"")[:10] + b"\x07" + bytes(20))  # a block of a type that there is not
+    log = CandumpReader(path, "bus", CanSettings())
+    assert not list(log)
+    assert log.report().malformed == {"truncated_file": 1}
+
+
 def test_two_buses_with_the_same_nodes_are_reassembled_apart(tmp_path: Path) -> None:
     one, two = lines(fix(), channel="can0"), lines(fix(sats_used=4), channel="can1")
     log = reader(tmp_path / "two.log", *(x for pair in zip(one, two, strict=True) for x in pair))
