@@ -45,6 +45,7 @@ system: install ## the daemon under real systemd with a real vcan0, in a guest
 
 docs: $(INSTALLED) ## the pages that are generated
 	$(BIN)/python -m service.config.reference > docs/configuration.md
+	$(BIN)/python -m service.publish.reference > docs/wire.md
 
 clean: ## remove everything that was made
 	rm -rf $(VENV) .vm build dist .pytest_cache .ruff_cache .hypothesis .coverage

@@ -96,7 +96,19 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
 
 
 class Health(msgspec.Struct, frozen=True, gc=False):
-    """Published when it changes: the state, the reason, since when (Unix seconds), how many jumps so far."""
+    """What the belief is worth: published when the state has changed or the position has jumped.
+
+    Attributes
+    ----------
+    time : float
+        Of the tick that found it, Unix seconds.
+    state, reason : HealthState, str
+        What it is now, and why.
+    since : float
+        When the state was entered, Unix seconds; a new reason does not change it.
+    reset_counter : int
+        How many jumps of the position so far, for other reasons than motion.
+    """
 
     time: float
     state: HealthState
@@ -106,7 +118,14 @@ class Health(msgspec.Struct, frozen=True, gc=False):
 
 
 class StageCost(msgspec.Struct, frozen=True, gc=False):
-    """Milliseconds that one stage took per tick since the last value: median, 99th percentile, worst."""
+    """Milliseconds that one stage took per tick, since the last value.
+
+    Attributes
+    ----------
+    median, p99, worst : float
+        Half of the ticks took no more than the median, 99 of 100 no more than ``p99``, none more than the
+        worst.
+    """
 
     median: float
     p99: float
@@ -189,7 +208,29 @@ class SensorStatus(msgspec.Struct, frozen=True, gc=False):
 
 
 class LinkStatus(msgspec.Struct, frozen=True, gc=False):
-    """One link as its process reports it; the counts are totals since that process started."""
+    """One link as its process reports it; the counts are totals since that process started.
+
+    Attributes
+    ----------
+    name : str
+        As configured.
+    state, reason : str
+        ``opening``, ``up``, ``silent`` (open, but nothing arrives) or ``retrying``, and why.
+    messages, samples : int
+        Messages understood, samples made of them.
+    malformed : dict[str, int]
+        What was refused, by kind: ``bad_checksum``, ``GPS_RAW_INT.fix_type`` …
+    ignored : int
+        Messages that are well-formed but not wanted: another system, component or kind.
+    dropped : int
+        Samples that the loop's queue had no room for.
+    clock : str
+        How the sensor's clock is mapped to the host's: ``timesync``, ``envelope`` …
+    offset, jitter : float or None
+        Seconds from the sensor's clock to the host's, and the spread of arrival about it.
+    age : float or None
+        Seconds since the last sample arrived.
+    """
 
     name: str
     state: str
@@ -206,7 +247,15 @@ class LinkStatus(msgspec.Struct, frozen=True, gc=False):
 
 
 class Sensors(msgspec.Struct, frozen=True, gc=False):
-    """Once a second: every sensor and every link."""
+    """Once a second: every sensor and every link.
+
+    Attributes
+    ----------
+    time : float
+        Unix seconds.
+    sensors, links : list[SensorStatus], list[LinkStatus]
+        All that are configured or were heard.
+    """
 
     time: float
     sensors: list[SensorStatus]
@@ -214,7 +263,22 @@ class Sensors(msgspec.Struct, frozen=True, gc=False):
 
 
 class ProcessStatus(msgspec.Struct, frozen=True, gc=False):
-    """One process of the service: what it is, whether it runs, how often it was restarted, what it holds."""
+    """One process of the service.
+
+    Attributes
+    ----------
+    name : str
+        ``supervisor``, ``loop``, ``publisher``, ``link autopilot`` …
+    pid : int or None
+        Its number while it runs.
+    state, reason : str
+        ``starting``, ``running``, ``waiting`` (to be started again), ``stopping`` or ``stopped``; how it
+        ended last.
+    restarts : int
+        How often it was started again.
+    resident_bytes : int or None
+        Memory that it holds.
+    """
 
     name: str
     pid: int | None
@@ -256,7 +320,21 @@ class Publishing(msgspec.Struct, frozen=True, gc=False):
 
 
 class Status(msgspec.Struct, frozen=True, gc=False):
-    """The answer to ``@rpc/status``: the last of everything, and the processes."""
+    """The answer to ``@rpc/status``.
+
+    Attributes
+    ----------
+    vehicle, version : str
+        Whose daemon it is, and which.
+    started : float
+        When the publishing process started, Unix seconds.
+    health, budget, sensors : Health, Budget, Sensors or None
+        The last of each; ``null`` while there was none.
+    processes : list[ProcessStatus]
+        All of the service.
+    publishing : Publishing or None
+        What the publishing process did and dropped.
+    """
 
     vehicle: str
     version: str
@@ -269,7 +347,17 @@ class Status(msgspec.Struct, frozen=True, gc=False):
 
 
 class Cloud(msgspec.Struct, frozen=True, gc=False):
-    """The attachment of ``particles``: how many rows, at which Unix time, of which columns."""
+    """The attachment of ``particles``.
+
+    Attributes
+    ----------
+    count : int
+        How many rows.
+    time : float
+        Of validity, Unix seconds.
+    columns : tuple[str, str, str, str]
+        What stands in each row, in this order.
+    """
 
     count: int
     time: float
