@@ -8,24 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
-from sim_vehicle.clock import BoardClock
-from sim_vehicle.dsdl import CanFrame, Node, message
+from sim_vehicle.dsdl import Node, message
+from sim_vehicle.fitting import BusSettings
+from sim_vehicle.frame import CanFrame
 from sim_vehicle.geodesy import Origin
+from sim_vehicle.rover import Rover
 from sim_vehicle.sensors import (
-    BarometerSettings,
     CompassReading,
-    CompassSettings,
     GnssReading,
-    GnssSettings,
     InertialReading,
-    InertialSettings,
     PressureReading,
 )
 from sim_vehicle.telemetry import FULL_SPEED, GAUSS_PER_TESLA
-from sim_vehicle.wire import WireSettings
 from sim_vehicle.world import Truth
 
 UTC = 2
@@ -35,38 +31,6 @@ _UNITLESS_COMMAND = 0
 """actuator.Command.command_type: a share of full speed, -1 to 1."""
 _LIDAR, _READING_VALID, _DOWNWARD = 2, 1, (0, -6, 0)
 """range_sensor.Measurement: sensor and reading type; roll, pitch, yaw of the beam in steps of 15 degrees."""
-
-
-@dataclass(frozen=True, slots=True)
-class BusSettings:
-    """What is on the bus.
-
-    Attributes
-    ----------
-    wire : WireSettings
-        The bus itself; ``spacing`` is what one frame takes, 0.13 ms at 1 Mbit/s.
-    clock : BoardClock
-        Of the sensor node.
-    gnss, inertial, compass, barometer
-        Sensors on the bus, apart from the autopilot's own; ``None``: not fitted.
-    motor_rate : float
-        esc.Status of both motors, esc.RawCommand and actuator.ArrayCommand, per second; 0: none.
-    wheel_radius : float
-        Metres; turns rim speed into the motors' revolutions.
-    clearance_rate, clearance : float
-        Readings per second of a range finder that looks down, and its height, metres; 0: none.
-    """
-
-    wire: WireSettings
-    clock: BoardClock = field(default_factory=BoardClock)
-    gnss: GnssSettings | None = None
-    inertial: InertialSettings | None = None
-    compass: CompassSettings | None = None
-    barometer: BarometerSettings | None = None
-    motor_rate: float = 0.0
-    wheel_radius: float = 0.12
-    clearance_rate: float = 0.0
-    clearance: float = 0.35
 
 
 class Bus:
@@ -168,10 +132,12 @@ class Bus:
         value.beam_orientation_in_body_frame.orientation_defined = True
         self._broadcast(now, self._sensors, value)
 
-    def motors(self, now: float, truth: Truth, wheel_speeds: tuple[float, float], track: float) -> None:
+    def motors(self, now: float, truth: Truth, rover: Rover, track: float) -> None:
         """Broadcast the motors' revolutions (esc.Status) and their commands (RawCommand, ArrayCommand)."""
         per_second = 1.0 / (math.tau * self._settings.wheel_radius)
-        for index, (node, speed) in enumerate(zip((self._left, self._right), wheel_speeds, strict=True)):
+        for index, (node, speed) in enumerate(
+            zip((self._left, self._right), rover.wheel_speeds(truth.motion), strict=True)
+        ):
             value = message(
                 "uavcan.equipment.esc.Status",
                 voltage=24.6,

@@ -1,28 +1,20 @@
 """DroneCAN values to CAN frames, by the ``dronecan`` package's own serialisation, without a node or a thread.
 
-The package carries no types: this module is where its values come in and leave as :class:`CanFrame`.
+The package carries no types: this module is where its values come in and leave as :class:`~sim_vehicle.frame.CanFrame`.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
 from typing import Any, cast
 
 import dronecan
 from dronecan import transport
 
+from sim_vehicle.frame import CanFrame
+
 PRIORITY = 16
 """Of every transfer, 0 the highest to 31 the lowest."""
-
-
-@dataclass(frozen=True, slots=True)
-class CanFrame:
-    """One classic CAN frame: identifier (29 bits when ``extended``), up to 8 bytes."""
-
-    identifier: int
-    data: bytes
-    extended: bool = True
 
 
 def message(name: str, **values: Any) -> Any:

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import can
 
-from sim_vehicle.dsdl import CanFrame
+from sim_vehicle.frame import CanFrame
 from sim_vehicle.slcan import Adapter
 
 LARGEST_DATAGRAM = 65_535

@@ -17,7 +17,7 @@ from typing import IO
 from sim_vehicle import configuration
 from sim_vehicle.clock import LOG_EPOCH
 from sim_vehicle.configuration import Listening
-from sim_vehicle.dsdl import CanFrame
+from sim_vehicle.frame import CanFrame
 from sim_vehicle.scenario import Scenario
 from sim_vehicle.vehicle import Vehicle
 from sim_vehicle.world import Truth

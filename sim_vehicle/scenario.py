@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from sim_vehicle.bus import BusSettings
 from sim_vehicle.clock import BoardClock
 from sim_vehicle.course import Course
 from sim_vehicle.faults import Fault
+from sim_vehicle.fitting import BusSettings
 from sim_vehicle.geodesy import Origin
 from sim_vehicle.rover import Rover
 from sim_vehicle.sensors import (

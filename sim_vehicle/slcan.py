@@ -15,7 +15,7 @@ import termios
 import tty
 from pathlib import Path
 
-from sim_vehicle.dsdl import CanFrame
+from sim_vehicle.frame import CanFrame
 
 _DONE, _REFUSED = b"\r", b"\a"
 _VERSION, _SERIAL_NUMBER = b"V1013\r", b"NB001\r"

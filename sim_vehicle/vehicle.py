@@ -17,11 +17,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from sim_vehicle.autopilot import Autopilot
-from sim_vehicle.bus import Bus
 from sim_vehicle.chance import stream
 from sim_vehicle.course import CourseDriver
-from sim_vehicle.dsdl import CanFrame
 from sim_vehicle.faults import Faults, Kind
+from sim_vehicle.frame import CanFrame
 from sim_vehicle.scenario import Scenario
 from sim_vehicle.sensors import Barometer, Cadence, Compass, Gnss, Inertial, Ranger, Wheels
 from sim_vehicle.telemetry import Knowledge
@@ -175,6 +174,9 @@ class Vehicle:
         scenario, chance, settings = self._scenario, self._chance, self._scenario.bus
         if settings is None:
             return
+        # dronecan takes most of a second to load: only a vehicle with a bus waits for it.
+        from sim_vehicle.bus import Bus
+
         bus = Bus(settings, scenario.origin, unix, self._send_can)
         if settings.gnss:
             gnss = Gnss(settings.gnss, chance("bus gnss"))
@@ -191,13 +193,11 @@ class Vehicle:
         if settings.clearance_rate:
             self._every(settings.clearance_rate, bus.clearance)
         if settings.motor_rate:
-            self._every(settings.motor_rate, lambda now: self._motors(bus, now))
+            self._every(
+                settings.motor_rate,
+                lambda now: bus.motors(now, self.world.at(now), scenario.rover, scenario.track),
+            )
         self._every(1.0, bus.status)
-
-    def _motors(self, bus: Bus, now: float) -> None:
-        truth = self.world.at(now)
-        speeds = self._scenario.rover.wheel_speeds(truth.motion)
-        bus.motors(now, truth, speeds, self._scenario.track)
 
     def _send_mavlink(self, time: float, frame: bytes) -> None:
         self._on_the_way.mavlink.extend(self.mavlink.carry(time, frame))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from sim_vehicle.bus import BusSettings
 from sim_vehicle.chance import stream
 from sim_vehicle.clock import BoardClock
 from sim_vehicle.faults import Window
+from sim_vehicle.fitting import BusSettings
 from sim_vehicle.scenario import Scenario, SensorFacts
 from sim_vehicle.scenarios import beacons
 from sim_vehicle.sensors import BarometerSettings, Cadence, CompassSettings, GnssSettings

@@ -9,11 +9,13 @@ from typing import Any
 import pytest
 from dronecan import transport
 
-from sim_vehicle.bus import Bus, BusSettings
+from sim_vehicle.bus import Bus
 from sim_vehicle.clock import BoardClock
-from sim_vehicle.dsdl import CanFrame, Node, message
+from sim_vehicle.dsdl import Node, message
+from sim_vehicle.fitting import BusSettings
+from sim_vehicle.frame import CanFrame
 from sim_vehicle.geodesy import Origin
-from sim_vehicle.rover import Command
+from sim_vehicle.rover import Command, SkidRover
 from sim_vehicle.sensors import (
     BarometerSettings,
     Cadence,
@@ -116,7 +118,7 @@ def test_the_other_sensors_survive_the_half_floats() -> None:
 def test_motors_say_their_revolutions_and_what_they_were_asked() -> None:
     bench = Bench()
     truth = Truth(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.2, 0.0, 0.0, 0.0, Command(1.5, 0.4))
-    bench.bus.motors(1.0, truth, (1.1, 0.9), track=0.5)
+    bench.bus.motors(1.0, truth, SkidRover(track=1.0, turning_slip=1.0), track=0.5)
     left, right, raw, array = bench.heard()
     assert [(item[0], item[1]) for item in (left, right, raw, array)] == [
         (51, 1034),

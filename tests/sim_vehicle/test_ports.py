@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import can
 import pytest
 
-from sim_vehicle.dsdl import CanFrame
+from sim_vehicle.frame import CanFrame
 from sim_vehicle.ports import MavlinkPort, PortError, open_can, open_mavlink
 
 

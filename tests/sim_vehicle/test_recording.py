@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from sim_vehicle import scenarios
 from sim_vehicle.clock import LOG_EPOCH
-from sim_vehicle.dsdl import CanFrame
+from sim_vehicle.frame import CanFrame
 from sim_vehicle.recording import candump_line, tlog_record, write
 
 ENDINGS = (".tlog", ".candump.log", "_truth.csv", ".toml")

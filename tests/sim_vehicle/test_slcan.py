@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_vehicle.dsdl import CanFrame
+from sim_vehicle.frame import CanFrame
 from sim_vehicle.slcan import Adapter, frame_line, parsed
 
 FRAME = CanFrame(0x1004172A, bytes(range(8)))
