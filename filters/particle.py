@@ -208,9 +208,11 @@ class ParticleFilter(Generic[Control]):
         innovation = sensor.innovation(self._centre_state(), measurement)
         constant = sensor.weigh(self._particles, 0, self.count, measurement)
         before = self._log_sum
-        self._log_sum = weights.log_sum(self._particles.log_weights, self._stride, self._sample)
+        after = weights.log_sum(self._particles.log_weights, self._stride, self._sample)
+        self._log_sum = after
         self._weighed = True
-        return Evidence(constant + self._log_sum - before, innovation, accepted=True)
+        log_mean = constant + after - before if after > -math.inf else -math.inf
+        return Evidence(log_mean, innovation, accepted=True)
 
     def normalize(self) -> None:
         """Line 6: make weights of the log weights.
@@ -221,7 +223,7 @@ class ParticleFilter(Generic[Control]):
         """
         count = self.count
         top = float(weights.peak(self._particles.log_weights, 0, count))
-        if not math.isfinite(top):
+        if not weights.NOTHING < top < math.inf:
             self.collapses += 1
             self._level()
             return

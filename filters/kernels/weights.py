@@ -22,6 +22,9 @@ Float64Array = NDArray[np.float64]
 # w, w·n, w·e, w·h, w·sin h, w·cos h, w·n², w·n·e, w·e², w·n·h, w·e·h, w·h²; the last is the largest |h|.
 SUMS = 13
 
+NOTHING = float32(-1e30)
+"""A log weight from here down is that of a particle which cannot be."""
+
 
 @kernel("float32(float32[::1], int64, int64)")
 def peak(log_weights: Float32Array, first: int, last: int) -> np.float32:
@@ -66,7 +69,7 @@ def log_sum(log_weights: Float32Array, stride: int, sample: Float32Array) -> flo
     for k in range(count):
         largest = max(largest, order(sample[k]))
     top = from_order(largest)
-    if not top > float32(-np.inf):
+    if not top > NOTHING:
         return -np.inf
     total = float32(0.0)
     for k in range(count):

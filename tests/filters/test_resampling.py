@@ -1,0 +1,147 @@
+"""Systematic resampling against Table 4.4, written out in plain Python."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from filters.kernels.resampling import places
+from filters.resampling import systematic
+
+weight_lists = st.lists(
+    st.one_of(st.just(0.0), st.floats(2.0**-100, 1.0, width=32)), min_size=1, max_size=60
+).filter(lambda weights: sum(weights) > 0.0)
+uniforms = st.floats(1e-9, 1.0)
+
+
+def table_4_4(weights: list[float], count: int, uniform: float) -> list[int]:
+    """Low_variance_sampler line by line, in exact arithmetic, for a target count of its own."""
+    exact = [Fraction(weight) for weight in weights]
+    total = sum(exact)
+    step = total / count
+    r = Fraction(uniform) * step
+    i = 0
+    c = exact[0]
+    chosen: list[int] = []
+    for m in range(count):
+        u = r + m * step
+        while u > c:
+            i += 1
+            c += exact[i]
+        chosen.append(i)
+    return chosen
+
+
+def near_a_tie(weights: list[float], count: int, uniform: float) -> bool:
+    """Whether rounding may decide: a cumulative weight within 1e-9 of a position."""
+    total = sum(map(Fraction, weights))
+    cumulative = Fraction(0)
+    for weight in weights:
+        cumulative += Fraction(weight)
+        place = float(cumulative * count / total) - uniform
+        if abs(place - round(place)) < 1e-9:
+            return True
+    return False
+
+
+@given(weight_lists, st.integers(1, 100), uniforms)
+@settings(max_examples=300, deadline=None)
+def test_it_is_table_4_4(weights: list[float], count: int, uniform: float) -> None:
+    array = np.array(weights, np.float32)
+    ancestors = systematic(array, count, uniform).tolist()
+    if not near_a_tie(array.tolist(), count, uniform):
+        assert ancestors == table_4_4(array.tolist(), count, uniform)
+
+
+@given(weight_lists, st.integers(1, 100), uniforms)
+@settings(max_examples=300, deadline=None)
+def test_copies_are_proportional_and_none_without_weight(
+    weights: list[float], count: int, uniform: float
+) -> None:
+    array = np.array(weights, np.float32)
+    ancestors = systematic(array, count, uniform)
+    assert (np.diff(ancestors) >= 0).all()
+    copies = np.bincount(ancestors, minlength=array.size)
+    expected = count * array.astype(np.float64) / array.astype(np.float64).sum()
+    assert (np.abs(copies - expected) < 1.0 + 1e-9).all()
+    assert (copies[array == 0.0] == 0).all()
+
+
+def test_it_is_unbiased() -> None:
+    """Averaged over an even grid of uniforms, the copies are the expectation: no chance is involved."""
+    weights = np.random.default_rng(1).exponential(size=37).astype(np.float32)
+    grid = (np.arange(4000) + 0.5) / 4000
+    copies = sum(np.bincount(systematic(weights, 50, u), minlength=37) for u in grid) / grid.size
+    expected = 50 * weights.astype(float) / weights.astype(float).sum()
+    assert np.abs(copies - expected).max() <= 1.0 / grid.size + 1e-9
+
+
+@pytest.mark.parametrize("place", [0, 3, 9])
+def test_one_hot(place: int) -> None:
+    weights = np.zeros(10, np.float32)
+    weights[place] = 1e-20
+    for uniform in (1e-12, 0.5, 1.0):
+        assert (systematic(weights, 25, uniform) == place).all()
+
+
+def test_one_particle() -> None:
+    assert systematic(np.ones(1, np.float32), 1, 0.3).tolist() == [0]
+    assert systematic(np.ones(1, np.float32), 5, 1.0).tolist() == [0] * 5
+
+
+def test_equal_weights_reproduce_the_set() -> None:
+    assert systematic(np.ones(1000, np.float32), 1000, 0.5).tolist() == list(range(1000))
+
+
+@pytest.mark.parametrize("uniform", [1e-15, 0.25, 1.0 - 1e-16, 1.0])
+def test_a_float32_sum_that_ends_below_one(uniform: float) -> None:
+    """A million equal float32 weights sum to 1.0000134 or 0.99 in float32, depending on the order."""
+    weights = np.full(1_000_000, 1e-6, np.float32)
+    weights[-1000:] = 0.0
+    ancestors = systematic(weights, 1_000_000, uniform)
+    assert ancestors.max() <= 998_999
+    assert ancestors.min() >= 0
+    assert np.bincount(ancestors).max() <= 2
+
+
+def test_more_and_fewer_than_the_source() -> None:
+    weights = np.random.default_rng(3).exponential(size=100).astype(np.float32)
+    for count in (1, 7, 99, 101, 5000):
+        assert systematic(weights, count, 0.4).tolist() == table_4_4(weights.tolist(), count, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("weights", "count", "uniform", "what"),
+    [
+        ([1.0], 0, 0.5, "count"),
+        ([1.0], 1, 0.0, "uniform"),
+        ([1.0], 1, math.nan, "uniform"),
+        ([0.0, 0.0], 1, 0.5, "sum"),
+        ([math.nan], 1, 0.5, "sum"),
+        ([math.inf], 1, 0.5, "sum"),
+        ([], 1, 0.5, "sum"),
+    ],
+)
+def test_what_cannot_be_resampled_is_refused(
+    weights: list[float], count: int, uniform: float, what: str
+) -> None:
+    with pytest.raises(ValueError, match=what):
+        systematic(np.array(weights, np.float32), count, uniform)
+
+
+@given(st.integers(1, 500), st.integers(1, 20))
+@settings(deadline=None)
+def test_places_are_a_deal(count: int, blocks: int) -> None:
+    blocks = min(blocks, count)
+    size, rest = divmod(count, blocks)
+    starts = np.array([b * size + min(b, rest) for b in range(blocks)], np.int64)
+    dealt = np.zeros(count, np.int32)
+    places(starts, dealt)
+    assert sorted(dealt.tolist()) == list(range(count))
+    block_of = np.searchsorted(starts, dealt, side="right") - 1
+    assert block_of.tolist() == [m % blocks for m in range(count)]
