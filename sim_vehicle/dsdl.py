@@ -1,6 +1,7 @@
 """DroneCAN values to CAN frames, by the ``dronecan`` package's own serialisation, without a node or a thread.
 
-The package carries no types: this module is where its values come in and leave as :class:`~sim_vehicle.frame.CanFrame`.
+The package carries no types: this module is where its values come in, to leave as
+:class:`~sim_vehicle.frame.CanFrame`.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, cast
 
 import pymap3d
@@ -22,8 +23,14 @@ class Origin:
 
     def geodetic(self, north: float, east: float, down: float) -> tuple[float, float, float]:
         """Return latitude and longitude in degrees and altitude in metres of a local point in metres."""
-        latitude, longitude, altitude = cast(
-            "tuple[Any, Any, Any]",
-            pymap3d.ned2geodetic(north, east, down, self.latitude, self.longitude, self.altitude),
-        )
-        return float(latitude), float(longitude), float(altitude)
+        return _geodetic(self, north, east, down)
+
+
+# Beacons stand still and say where with every range: a few places are asked for again and again.
+@lru_cache(maxsize=64)
+def _geodetic(origin: Origin, north: float, east: float, down: float) -> tuple[float, float, float]:
+    latitude, longitude, altitude = cast(
+        "tuple[Any, Any, Any]",
+        pymap3d.ned2geodetic(north, east, down, origin.latitude, origin.longitude, origin.altitude),
+    )
+    return float(latitude), float(longitude), float(altitude)
