@@ -29,7 +29,6 @@ LATEST = 5 * SECOND  # nor is one that is later than that: no link holds data ba
 NEW_LINE_AFTER = 3
 NEW_LINE_WITHIN = 750_000_000  # … within the worst jitter of arrival seen on a real autopilot, …
 NEW_LINE_SPAN = 2 * SECOND  # … for so long unless they lie behind: a backlog delivered late advances faster
-LONGEST_LATENCY = 2 * SECOND  # TIMESYNC further than this below the envelope speaks of another clock
 EPOCH_FROM_US = 10**15  # 31 years since boot, or September 2001: a stamp beyond is Unix time
 
 
@@ -191,7 +190,7 @@ class ClockMap:
         if len(self._exchanges) < EXCHANGES_NEEDED:
             return None
         best = min(self._exchanges, key=lambda exchange: exchange.error(now))
-        if envelope - LONGEST_LATENCY <= best.offset <= envelope + best.error(now):
+        if best.offset <= envelope + best.error(now):  # else a stamp came before it can have been given
             return best
         self.disagreements += 1
         return None

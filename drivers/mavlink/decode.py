@@ -152,7 +152,11 @@ class Decoder:
         return next(iter(self._clocks.values()), None)
 
     def _believed(self, message: Message) -> bool:
-        """Whether the message is from the vehicle; its first heartbeat says who that is."""
+        """Whether the message is from the vehicle.
+
+        Where no system is named, the first autopilot that is heard says who that is; until then every system
+        is believed, so that a log without heartbeats can be read.
+        """
         components = self._settings.components
         if components is None:
             if message.component in GIMBALS or message.component in CAMERAS:

@@ -45,7 +45,13 @@ def _inertial(rate: Vector | None, force: Vector | None, field: Vector | None) -
 
 
 def highres_imu(fields: Any, at: Moment) -> list[Timed]:
-    """HIGHRES_IMU 105: only what ``fields_updated`` names; a lone yaw rate becomes a :class:`Rotation`."""
+    """HIGHRES_IMU 105: only what ``fields_updated`` names; a lone yaw rate becomes a :class:`Rotation`.
+
+    Units beyond the first (``id``) see the same motion: used beside it they would count twice.
+    """
+    if fields.id != 0:
+        at.refuse("id")
+        return []
     updated: int = fields.fields_updated
     rate = force = field = None
     if updated & GYRO_BITS == GYRO_BITS:
@@ -74,6 +80,9 @@ def raw_imu(fields: Any, at: Moment) -> list[Timed]:
     """RAW_IMU 27: ArduPilot scales it like SCALED_IMU; from others it is counts of an unknown scale."""
     if at.autopilot != ARDUPILOT:
         at.refuse("autopilot")
+        return []
+    if fields.id != 0:
+        at.refuse("id")
         return []
     time = at.microseconds(fields.time_usec)
     return [(time, reading) for reading in _thousandths(fields, at)]

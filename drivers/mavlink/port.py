@@ -179,8 +179,8 @@ class ListeningPort(_SocketPort):
             return []
 
     def write(self, data: bytes) -> bool:
-        """Send; whether all of it was taken."""
-        return self._client is not None and self._client.write(data)
+        """Send; whether all of it was taken, which is so when there is no one to take it."""
+        return self._client is None or self._client.write(data)
 
     def close(self) -> None:
         """Close; harmless when it is closed."""

@@ -12,11 +12,11 @@ ALL = 8191
 FIELD = (0.2, 0.08, -0.5)  # gauss
 
 
-def highres(updated: int, mag: tuple[float, float, float] = FIELD, acc: float = -9.8) -> bytes:
+def highres(updated: int, mag: tuple[float, float, float] = FIELD, acc: float = -9.8, unit: int = 0) -> bytes:
     return frame(
         "HIGHRES_IMU",
         *(7_000_000, 0.1, 0.2, acc, 0.01, 0.02, 0.03, *mag),
-        *(1013.25, 0.5, 100.0, 25.0, updated, 0),
+        *(1013.25, 0.5, 100.0, 25.0, updated, unit),
     )
 
 
@@ -121,3 +121,9 @@ def test_stamps_of_one_autopilot_share_its_boot_clock(ear: Ear) -> None:
     (late,) = ear.hear(thousandths("RAW_IMU", 10_020_000, 0, 0, -1000, 0, 0, 1, 0, 0, 0), at=200_300_000_000)
     assert late.time == pytest.approx(200_020_000_000, abs=50_000)
     assert late.received == 200_300_000_000
+
+
+def test_a_second_unit_in_one_message_kind_is_not_counted_twice(ear: Ear) -> None:
+    assert ear.hear(highres(ALL, unit=1)) == []
+    assert ear.hear(frame("RAW_IMU", 8_000_000, 1, 2, 3, 4, 5, 6, 7, 8, 9, 1, 0)) == []
+    assert ear.refused == {"HIGHRES_IMU.id": 1, "RAW_IMU.id": 1}
