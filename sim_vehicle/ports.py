@@ -16,6 +16,8 @@ from sim_vehicle.frame import CanFrame
 from sim_vehicle.slcan import Adapter
 
 LARGEST_DATAGRAM = 65_535
+LARGEST_AUDIENCE = 8
+"""UDP peers that are sent to; whoever spoke longest ago makes room for a new one."""
 LARGEST_BACKLOG = 65_536
 """Bytes that a slow TCP client may leave unread before frames are dropped."""
 
@@ -103,7 +105,7 @@ class UdpServer(_Udp):
     def __init__(self, host: str, port: int) -> None:
         super().__init__()
         self._socket.bind((host, port))
-        self._peers: set[tuple[str, int]] = set()
+        self._peers: dict[tuple[str, int], None] = {}
         self.address = f"udpin:{host}:{self._socket.getsockname()[1]}"
 
     def send(self, frame: bytes) -> None:
@@ -116,7 +118,10 @@ class UdpServer(_Udp):
     def receive(self) -> list[bytes]:
         """Return what has arrived since the last call."""
         arrived = self._receive_from()
-        self._peers.update(peer for _data, peer in arrived)
+        for _data, peer in arrived:
+            self._peers[peer] = self._peers.pop(peer, None)
+        for silent in list(self._peers)[:-LARGEST_AUDIENCE]:
+            del self._peers[silent]
         return [data for data, _peer in arrived]
 
 
@@ -150,7 +155,7 @@ class TcpServer:
 
     def receive(self) -> list[bytes]:
         """Return what has arrived since the last call."""
-        with contextlib.suppress(BlockingIOError):
+        with contextlib.suppress(BlockingIOError, ConnectionAbortedError):
             client, _peer = self._listening.accept()
             self._hang_up()
             client.setblocking(False)
@@ -264,9 +269,13 @@ class BusPort:
             self.dropped += 1
 
     def serve(self) -> None:
-        """Take in what others have sent: the vehicle's nodes count it and want nothing of it."""
-        while self._bus.recv(timeout=0.0) is not None:
-            self.received += 1
+        """Take in what others have sent: the vehicle's nodes count it and want nothing of it.
+
+        A bus that has gone down is not an end: its frames count as dropped until it is up again.
+        """
+        with contextlib.suppress(can.CanError):
+            while self._bus.recv(timeout=0.0) is not None:
+                self.received += 1
 
     def close(self) -> None:
         """Close it."""

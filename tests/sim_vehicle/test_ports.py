@@ -12,7 +12,7 @@ import can
 import pytest
 
 from sim_vehicle.frame import CanFrame
-from sim_vehicle.ports import MavlinkPort, PortError, open_can, open_mavlink
+from sim_vehicle.ports import LARGEST_AUDIENCE, MavlinkPort, PortError, open_can, open_mavlink
 
 
 @contextlib.contextmanager
@@ -66,6 +66,24 @@ def test_udpin_waits_until_it_is_spoken_to() -> None:
         assert heard(port) == b"hello"
         port.send(b"found")
         assert client.recv(100) == b"found"
+
+
+def test_udpin_sends_to_the_last_who_spoke_and_forgets_the_first() -> None:
+    with opened("udpin:127.0.0.1:0") as (port, number), contextlib.ExitStack() as clients:
+        sockets: list[socket.socket] = []
+        for _ in range(LARGEST_AUDIENCE + 1):
+            client = clients.enter_context(
+                contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            )
+            client.settimeout(5.0)
+            client.sendto(b"hello", ("127.0.0.1", number))
+            assert heard(port) == b"hello"
+            sockets.append(client)
+        port.send(b"news")
+        assert all(client.recv(100) == b"news" for client in sockets[1:])
+        sockets[0].setblocking(False)
+        with pytest.raises(BlockingIOError):
+            sockets[0].recv(100)
 
 
 def test_tcpin_serves_one_client_after_another() -> None:
