@@ -52,7 +52,7 @@ class LinkProcess:
         self._report_due = 0.0
 
     def run(self) -> None:
-        """Keep the link open and pass on what it says, until an exception (SystemExit on SIGTERM) ends it."""
+        """Keep the link open and pass on what it says, until an exception (on SIGTERM) ends it."""
         try:
             while True:
                 self._attempt()

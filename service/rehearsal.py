@@ -1,8 +1,8 @@
 """A dry run before the first tick: each kernel, import and page that a tick needs is touched once.
 
-Throw-away estimators of the same configuration, one with few particles and one with many, are fed invented readings
-for each sensor that is configured. What the stages cost at the two counts is their shape on this machine, from which
-the governor starts. Nothing else of it is kept, and nothing published.
+Throw-away estimators of the same configuration, one with few particles and one with many, are fed invented
+readings for each sensor that is configured. What the stages cost at the two counts is their shape on this
+machine, from which the governor starts. Nothing else of it is kept, and nothing published.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ def rehearse(configuration: Configuration) -> dict[str, Shape]:
     many = min(configuration.budget.particles_max, max(MANY, 2 * few))
     cheap, dear = _costs(configuration, few), _costs(configuration, many)
     return {
-        stage: _line(few, cheap[stage], many, dear[stage])
+        stage: line(few, cheap[stage], many, dear[stage])
         for stage in PARTICLE_STAGES
         if cheap[stage] > 0.0 and dear[stage] > 0.0
     }
 
 
-def _line(few: int, cheap: float, many: int, dear: float) -> Shape:
-    """Return the line through two points; where it would fall or start below zero, the nearest that does not."""
+def line(few: int, cheap: float, many: int, dear: float) -> Shape:
+    """Return the line through two points, or the nearest that neither falls nor starts below zero."""
     if many == few:
         return Shape(0.0, max(dear / many, _LEAST))
     slope = min(max((dear - cheap) / (many - few), _LEAST), dear / many)

@@ -1,8 +1,9 @@
-"""The daemon between two strangers: a plain pymavlink script and a plain Zenoh subscriber, none of the project's."""
+"""The daemon between two strangers: a plain pymavlink script and a plain Zenoh subscriber."""
 
 from __future__ import annotations
 
 import json
+import os
 import queue
 import signal
 import socket
@@ -166,7 +167,7 @@ def test_bytes_in_belief_out(vehicle: Vehicle, capsys: pytest.CaptureFixture[str
     first_data = vehicle.drive("autopilot")
     arrival = vehicle.wait("estimate", lambda value: value["position"][0] is not None)
     with capsys.disabled():
-        print(f"\nfirst data to first estimate: {arrival.seconds - first_data:.3f} s")
+        sys.stdout.write(f"\nfirst data to first estimate: {arrival.seconds - first_data:.3f} s\n")
     assert arrival.seconds - first_data < 10.0
     later = vehicle.wait("estimate", lambda value: value["monotonic_ns"] * 1e-9 > first_data + 5.0)
     north, east, _ = later.value["position"]
@@ -202,3 +203,40 @@ def test_a_taken_port_is_named_and_the_rest_goes_on(vehicle: Vehicle) -> None:
         radio = next(link for link in sensors["links"] if link["name"] == "radio")
         assert str(vehicle.ports["radio"]) in radio["reason"]
     vehicle.wait("sensors", lambda value: all(link["state"] in ("up", "silent") for link in value["links"]))
+
+
+def children(pid: int) -> dict[str, int]:
+    """Return the processes under the supervisor: role to number."""
+    found: dict[str, int] = {}
+    for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+        words = Path(f"/proc/{child}/cmdline").read_text().split("\0")
+        if "service.process" in words:
+            role = words[words.index("service.process") + 1]
+            name = words[words.index("--name") + 1] if "--name" in words else ""
+            found[f"{role} {name}".strip()] = int(child)
+    return found
+
+
+def test_a_kill_in_flight_is_survived_by_all(vehicle: Vehicle) -> None:
+    """Loop, link and publisher are killed in turn while the vehicle drives: the estimate comes back."""
+    daemon = vehicle.start_daemon()
+    vehicle.subscribe()
+    vehicle.drive("autopilot", seconds=120.0)
+    vehicle.wait("estimate", lambda value: value["position"][0] is not None)
+    before = children(daemon.pid)
+    assert set(before) == {"loop", "publisher", "link autopilot", "link radio"}
+    for role in ("link autopilot", "loop"):
+        os.kill(before[role], signal.SIGKILL)
+        killed = time.monotonic()
+        vehicle.wait(
+            "estimate",
+            lambda value, killed=killed: (
+                value["monotonic_ns"] * 1e-9 > killed + 1.0 and value["position"][0] is not None
+            ),
+        )
+        vehicle.wait("sensors", lambda value: value["links"][0]["state"] == "up")
+    after = children(daemon.pid)
+    assert {role for role in after if after[role] != before[role]} == {"link autopilot", "loop"}
+    os.kill(after["publisher"], signal.SIGKILL)
+    vehicle.subscribe()
+    vehicle.wait("health", lambda value: True)

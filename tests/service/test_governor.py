@@ -66,7 +66,7 @@ def test_converges_to_what_the_budget_affords() -> None:
 def test_seldom_exceeds_the_budget(noise: float) -> None:
     """At most 2 % of 5,000 ticks, for independent log-normal noise of 5, 10 and 20 % on every stage.
 
-    The sum of the stages' 95 % quantiles is beyond the 99 % quantile of their sum here. Seeded: no false alarms.
+    The sum of the stages' 95 % quantiles lies beyond the 99 % quantile of their sum here. Seeded.
     """
     counts, costs = Machine(noise).run(fresh(), 5_000)
     assert np.mean(costs > BUDGET) <= 0.02
@@ -175,7 +175,7 @@ def test_one_early_exception_does_not_rule() -> None:
 
 @pytest.mark.parametrize("wrong", [Shape(0.0, 1.0), Shape(5e-5, 1e-9), Shape(1e-6, 1e-6)])
 def test_a_wrong_shape_still_leads_to_the_right_count(wrong: Shape) -> None:
-    """From shapes that are off by orders of magnitude, in both parts, the count ends where the budget does."""
+    """From shapes that are off by orders of magnitude, the count ends where the budget does."""
     governor = Governor(BUDGET, SMALLEST, LARGEST, dict.fromkeys(STAGES, wrong))
     counts, costs = Machine(noise=0.02).run(governor, 2_000)
     assert 0.8 * AFFORDABLE <= counts[-1] <= 1.05 * AFFORDABLE
@@ -183,7 +183,7 @@ def test_a_wrong_shape_still_leads_to_the_right_count(wrong: Shape) -> None:
 
 
 def test_small_counts_do_not_hide_what_large_ones_would_cost() -> None:
-    """At 200 particles nearly everything is overhead; the supply is still that of the slope, within a tenth."""
+    """At 200 particles nearly everything is overhead; the supply is still that of the slope."""
     governor = fresh()
     Machine(noise=0.0).run(governor, 300, demand=SMALLEST)
     assert governor.decide(SMALLEST).afforded == pytest.approx(AFFORDABLE, rel=0.11)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -148,7 +147,7 @@ def of(values: list[Value], topic: str) -> list[bytes]:
 
 
 def test_every_tick_publishes_and_the_rest_has_its_rate(rig: Rig) -> None:
-    """Two seconds at 100 Hz: 200 estimates, two budgets, two sensors, one health, ten clouds, twenty beats."""
+    """Two seconds at 100 Hz: 200 estimates, 2 budgets, 2 sensors, 1 health, 10 clouds, 20 beats."""
     rig.estimator.health = HealthState.TRACKING
     rig.run(200)
     values = rig.published()
@@ -192,7 +191,7 @@ def test_samples_of_all_links_are_taken(rig: Rig) -> None:
 
 
 def test_a_flood_stays_in_its_queue_and_the_other_link_is_heard(rig: Rig) -> None:
-    """One link's queue is full to the brim; the other's only sample is in the same tick; the flood is not lost."""
+    """One queue is full to the brim; the other link's only sample is heard at once, and no flood is lost."""
     radio, bus = rig.links["radio"].outlet, rig.links["bus"].outlet
     sent = 0
     try:
@@ -270,11 +269,11 @@ def test_the_cloud_has_its_rows_and_says_so(rig: Rig) -> None:
 
 
 def test_nothing_is_left_open(configuration: Configuration) -> None:
-    before = len(os.listdir("/proc/self/fd"))
+    before = len(list(Path("/proc/self/fd").iterdir()))
     rig = Rig(configuration)
     rig.run(2)
     rig.close()
-    assert len(os.listdir("/proc/self/fd")) == before
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
 
 
 def test_the_summary_is_one_line(rig: Rig) -> None:

@@ -32,7 +32,8 @@ def main() -> None:
         if tick % RATE == 0:
             mav.heartbeat_send(10, 3, 0, 0, 4)
         if tick == 0:
-            print(time.monotonic(), flush=True)
+            sys.stdout.write(f"{time.monotonic()}\n")
+            sys.stdout.flush()
         mav.wheel_distance_send(stamp, 2, [north, north] + [0.0] * 14)
         mav.highres_imu_send(stamp, 0, 0, -9.81, 0, 0, 0.0, 0.2, 0, 0.4, 1013.0, 0, 0, 20.0, 0b111111, 0)
         if tick % 5 == 0:

@@ -10,6 +10,11 @@ import time
 import zenoh
 
 
+def say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
 def main() -> None:
     configuration = zenoh.Config()
     configuration.insert_json5("mode", '"client"')
@@ -18,7 +23,7 @@ def main() -> None:
     configuration.insert_json5("scouting/multicast/enabled", "false")
     with zenoh.open(configuration) as session:
         values = session.declare_subscriber(sys.argv[2], zenoh.handlers.RingChannel(1000))
-        print("subscribed", flush=True)
+        say("subscribed")
         while True:
             value = values.try_recv()
             if value is None:
@@ -27,7 +32,7 @@ def main() -> None:
             if str(value.key_expr).endswith("/particles"):
                 continue  # binary
             payload = value.payload.to_string()
-            print(time.monotonic(), value.key_expr, payload, sep="\t", flush=True)
+            say(f"{time.monotonic()}\t{value.key_expr}\t{payload}")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,70 @@
+"""From the configuration to drivers that were told everything it says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from drivers.can import CanLink
+from drivers.link import LinkError
+from drivers.mavlink.link import MavlinkLink
+from drivers.zenoh import ZenohLink
+from service.config import Configuration, load
+from service.links import link_named
+
+TOML = """
+[vehicle]
+name = "rover"
+[[link]]
+name = "autopilot"
+kind = "mavlink"
+url = "udpin:127.0.0.1:0"
+system = 7
+components = [1]
+rates = { RAW_IMU = 50.0 }
+[[link.servo]]
+channel = 3
+low = 1100
+high = 1900
+[[link]]
+name = "bus"
+kind = "can"
+interface = "socketcan"
+channel = "nosuchbus"
+[[link]]
+name = "uwb"
+kind = "zenoh"
+"""
+
+
+@pytest.fixture
+def configuration(tmp_path: Path) -> Configuration:
+    path = tmp_path / "rover.toml"
+    path.write_text(TOML)
+    return load(path)
+
+
+def test_each_kind_has_its_driver(configuration: Configuration) -> None:
+    kinds = {"autopilot": MavlinkLink, "bus": CanLink, "uwb": ZenohLink}
+    for name, kind in kinds.items():
+        link = link_named(configuration, name)
+        assert isinstance(link, kind)
+        assert link.report().link == name
+
+
+def test_a_mavlink_link_opens_where_it_was_told(configuration: Configuration) -> None:
+    link = link_named(configuration, "autopilot")
+    link.open()
+    assert link.poll(0.0) == []
+    link.close()
+
+
+def test_a_bus_that_is_not_there_is_named(configuration: Configuration) -> None:
+    with pytest.raises(LinkError, match="nosuchbus"):
+        link_named(configuration, "bus").open()
+
+
+def test_an_unknown_name_is_said(configuration: Configuration) -> None:
+    with pytest.raises(KeyError, match="sonar"):
+        link_named(configuration, "sonar")
