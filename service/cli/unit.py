@@ -47,8 +47,10 @@ def install(
         if not no_start:
             room.start(names)
             say(f"{names.service} is ready")
-    except (room.InstallError, ValueError) as error:
+    except room.InstallError as error:
         raise CommandError(str(error)) from error
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
 
 
 @application.command()
@@ -59,8 +61,10 @@ def status(name: _Name = None) -> None:
 
     try:
         leave(standing.show(name))
-    except (room.InstallError, ValueError) as error:
+    except room.InstallError as error:
         raise CommandError(str(error)) from error
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
 
 
 @application.command()
@@ -77,5 +81,7 @@ def uninstall(
         names = room.uninstall(name, say)
         if remove_all:
             room.purge(names, say)
-    except (room.InstallError, ValueError) as error:
+    except room.InstallError as error:
         raise CommandError(str(error)) from error
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error

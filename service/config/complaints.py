@@ -77,7 +77,6 @@ _WORDS: dict[str, Callable[[ErrorDetails], str]] = {
     "greater_than_equal": _limit("at least", "ge"),
     "less_than": _limit("less than", "lt"),
     "less_than_equal": _limit("at most", "le"),
-    "too_short": lambda error: f"needs at least {error.get('ctx', {}).get('min_length')}, got none",
     "string_too_short": lambda error: "needs a text that is not empty",
     "string_pattern_mismatch": _pattern,
     "literal_error": _one_of,

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BeforeValidator
+from pydantic_core import PydanticCustomError
 
 from service.config.belief import Area, Beacon, Map, Motion, Origin, Sensor, Start, Vehicle
 from service.config.links import Link
 from service.config.running import Budget, Loop, Publish, State
 from service.config.section import Section
+
+
+def _not_empty(value: Any) -> Any:
+    # before the links themselves: one that is wrong is still one
+    if value in ([], ()):
+        raise PydanticCustomError("empty", "needs at least one, got none")
+    return value
 
 
 class Sections(Section):
@@ -64,5 +72,5 @@ class Configuration(Sections):
 
     vehicle: Vehicle
     """[vehicle]"""
-    link: Annotated[tuple[Link, ...], Field(min_length=1)]
+    link: Annotated[tuple[Link, ...], BeforeValidator(_not_empty)]
     """[[link]], at least one"""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pwd
 import shutil
 import sys
@@ -86,7 +87,9 @@ def install(source: Path, name: str | None, say: Say) -> Names:
         say(f"configuration {path}")
     call(*as_user(USER, str(script), "check", str(names.configuration)))
     say(f"kernels, as {USER}, in {CACHE}")
-    watched(as_user(USER, str(script), "warm", CACHE_DIRECTORY=str(CACHE), TERM="dumb"))
+    watched(
+        as_user(USER, str(script), "warm", CACHE_DIRECTORY=str(CACHE), TERM=os.environ.get("TERM", "dumb"))
+    )
     names.unit_file.write_text(render(names, load(names.configuration), script), encoding="utf-8")
     say(f"unit {names.unit_file}")
     call("systemctl", "daemon-reload")

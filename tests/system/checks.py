@@ -176,6 +176,11 @@ class Estimates:
         newest = self.after(moment)
         return newest if newest and newest["position"][0] is not None else None
 
+    def counts_anew(self, since: float) -> bool:
+        """Tell whether the numbers of the estimates have begun again since then: another loop speaks."""
+        numbers = [estimate["sequence"] for moment, estimate in self.arrived if moment > since - 1.0]
+        return any(later < earlier for earlier, later in pairwise(numbers))
+
     def gap(self, since: float) -> float:
         """Return the longest time without an estimate from ``since`` to now, seconds."""
         times = [since, *(moment for moment, _ in self.arrived if moment > since), time.monotonic()]

@@ -1,8 +1,8 @@
 """The daemon as a user installs it: run as root in the guest by run.sh, on a real vcan0 and real systemd.
 
-The vehicle is ``python -m sim_vehicle``, which speaks DroneCAN on vcan0 and MAVLink over UDP. Satellite fixes come by
-the bus alone, and the configuration starts from the first fix, so that a first position proves that frames on vcan0
-have come through.
+The vehicle is ``python -m sim_vehicle``, which speaks DroneCAN on vcan0 and MAVLink over UDP. Satellite fixes
+come by the bus alone, and the configuration starts from the first fix, so that a first position proves that
+frames on vcan0 have come through.
 """
 
 from __future__ import annotations
@@ -232,10 +232,8 @@ def recovered(name: str, estimates: Estimates, vehicle: Vehicle, since: float) -
 
 
 def located_again(estimates: Estimates, vehicle: Vehicle, since: float) -> str:
-    """Wait for the estimates of a new loop, then for a position: its first fix, so that it needs satellites."""
-    time.sleep(0.2)  # what was under way from the old one has arrived
-    gone = time.monotonic()
-    until(lambda: estimates.after(gone), "an estimate of the new loop")
+    """Wait for the estimates of a new loop, then for a position; its first fix needs satellites again."""
+    until(lambda: estimates.counts_anew(since), "an estimate of the new loop")
     gap = estimates.gap(since)
     vehicle.again()
     until(lambda: estimates.located_after(time.monotonic() - 0.5), "a position of the new loop")

@@ -114,7 +114,7 @@ SINGLE = [
         "odometry",
         'link "autopilot" (link 1), send: "odometry" is not in this version, which has: none',
     ),
-    ("link", [], "link: needs at least 1, got none"),
+    ("link", [], "link: needs at least one, got none"),
     ("link", DELETE, "link: is missing: [[link]], at least one"),
     ("link.0", 3, "link 1: needs a table, got 3"),
     ("vehicle", DELETE, "vehicle: is missing: [vehicle]"),

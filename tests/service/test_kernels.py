@@ -1,0 +1,99 @@
+"""Where the compiled kernels go: each case in a process of its own, for numba reads it once."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from service import kernels
+
+ROOT = Path(__file__).parents[2]
+PREPARE = "from service import kernels; print(kernels.prepare())"
+
+
+def prepared(code: str = PREPARE, **environment: str) -> subprocess.CompletedProcess[str]:
+    clean = {
+        key: value for key, value in os.environ.items() if key not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
+    }
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+        env=clean | environment,
+        timeout=120,
+    )
+
+
+def test_systemds_cache_folder_comes_first_then_the_users(tmp_path: Path) -> None:
+    service, user, home = tmp_path / "service", tmp_path / "user", tmp_path / "home"
+    name = f"kernels-{kernels.digest()}"
+    both = prepared(CACHE_DIRECTORY=f"{service}:/other", XDG_CACHE_HOME=str(user), HOME=str(home))
+    assert both.stdout.strip() == str(service / name), both.stderr
+    assert prepared(XDG_CACHE_HOME=str(user), HOME=str(home)).stdout.strip() == str(user / "beliefd" / name)
+    assert prepared(HOME=str(home)).stdout.strip() == str(home / ".cache" / "beliefd" / name)
+
+
+def test_a_folder_that_cannot_be_made_is_passed_over(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = prepared(CACHE_DIRECTORY=str(tmp_path / "file"), HOME=str(tmp_path))
+    assert done.stdout.strip().startswith(str(tmp_path / ".cache"))
+
+
+def test_without_a_home_it_is_the_temporary_folder(tmp_path: Path) -> None:
+    done = prepared(HOME="/proc/nonexistent", TMPDIR=str(tmp_path))
+    assert done.stdout.strip().startswith(f"{tmp_path}/beliefd-{os.getuid()}/kernels-")
+
+
+def test_a_choice_that_is_made_already_stands(tmp_path: Path) -> None:
+    assert prepared(NUMBA_CACHE_DIR=str(tmp_path)).stdout.strip() == str(tmp_path)
+
+
+def test_numba_must_not_have_been_imported() -> None:
+    done = prepared(f"import numba; {PREPARE}")
+    assert done.returncode == 1
+    assert "must run before numba is imported" in done.stderr
+
+
+def test_preparing_imports_no_kernel(tmp_path: Path) -> None:
+    done = prepared(
+        f"{PREPARE}; import sys; print('numba' in sys.modules, 'filters' in sys.modules)", HOME=str(tmp_path)
+    )
+    assert done.stdout.splitlines()[1] == "False False"
+
+
+def test_the_digest_follows_the_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "filters").mkdir()
+    source = tmp_path / "filters" / "__init__.py"
+    monkeypatch.setattr(kernels, "_sources", lambda: [source])
+    digests: set[str] = set()
+    for text in ("a = 1", "a = 2", "a = 1 "):
+        source.write_text(text)
+        digests.add(kernels.digest())
+    assert len(digests) == 3
+    source.write_text("a = 1")
+    assert kernels.digest() in digests
+
+
+def test_the_digest_is_of_this_tree() -> None:
+    assert re.fullmatch(r"[0-9a-f]{12}", kernels.digest())
+    assert ROOT / "filters" / "__init__.py" in kernels._sources()
+
+
+def test_a_cache_of_an_older_version_goes_in_the_end(tmp_path: Path) -> None:
+    for age, name in enumerate(["kernels-now", "kernels-b", "kernels-c", "kernels-d", "kernels-e", "other"]):
+        (tmp_path / name).mkdir()
+        os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
+    kernels._prune(tmp_path / "kernels-now")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "kernels-b",
+        "kernels-c",
+        "kernels-now",
+        "other",
+    ]
