@@ -95,8 +95,8 @@ class ParticleFilter(Generic[Control]):
         self._sample: Float32Array = np.zeros(0, np.float32)
         self._bounds: list[tuple[int, int]] = []
         self._sums = np.zeros(2)
-        self._moment_sums = np.zeros(weights.SUMS)
-        self._spread_sums = np.zeros((len(names), 2))
+        self._moment_sums = np.zeros(weights.SUMS + 2 * (len(names) - len(POSE)))
+        self._reference = np.zeros(len(POSE), np.float32)
         self._log_sum = 0.0
         self._stride = 1
         self._centre_values: dict[str, float] = {}
@@ -227,7 +227,7 @@ class ParticleFilter(Generic[Control]):
             self.collapses += 1
             self._level()
             return
-        self._sums[:] = 0.0
+        self._sums.fill(0.0)
         for first, last in self._bounds:
             weights.exponentiate(self._particles.log_weights, self._weights, first, last, top, self._sums)
         self._log_sum -= top
@@ -242,41 +242,32 @@ class ParticleFilter(Generic[Control]):
         self._settle()
         shift = STILL if displacement is None else displacement
         centre: list[float] = self._centre.columns[:, 0].tolist()
-        north, east, heading = _displaced(centre, shift)
-        sums, offset = self._pose_sums(shift, north, east, heading)
+        north, east, heading = self._displaced(centre, shift)
+        sums, offset = self._sums_about(shift, north, east, heading)
         if abs(offset) > 1e-6 and sums[12] + abs(offset) >= 3.14:
-            heading += (
-                offset  # some particle's difference wraps elsewhere about the mean than about the reference
-            )
-            sums, offset = self._pose_sums(shift, north, east, heading)
-        n, e, h = (part / sums[0] for part in sums[1:4])
-        nn, ne, ee, nh, eh, hh = (part / sums[0] for part in sums[6:12])
-        covariance_ne, covariance_nh, covariance_eh = ne - n * e, nh - n * h, eh - e * h
-        variances = (
-            max(nn - n * n, 0.0),
-            max(ee - e * e, 0.0),
-            max(hh - 2.0 * offset * h + offset * offset, 0.0),
-        )
-        covariance = np.array(
-            [
-                [variances[0], covariance_ne, covariance_nh],
-                [covariance_ne, variances[1], covariance_eh],
-                [covariance_nh, covariance_eh, variances[2]],
-            ]
-        )
-        slow, slow_variances = self._spread(centre)
-        self._centre.columns[:, 0] = (
-            centre[0] + n,
-            centre[1] + e,
-            _wrap(heading + offset - shift.turn),
-            *slow,
-        )
+            # some particle's difference wraps elsewhere about the mean than about the reference
+            heading += offset
+            sums, offset = self._sums_about(shift, north, east, heading)
+        total = sums[0]
+        n, e, h = sums[1] / total, sums[2] / total, sums[3] / total
+        ne, nh, eh = sums[7] / total - n * e, sums[9] / total - n * h, sums[10] / total - e * h
+        nn = max(sums[6] / total - n * n, 0.0)
+        ee = max(sums[8] / total - e * e, 0.0)
+        hh = max(sums[11] / total - 2.0 * offset * h + offset * offset, 0.0)
+        slow: list[float] = []
+        variance = [nn, ee, hh]
+        for row, place in enumerate(range(weights.SUMS, len(sums), 2), len(POSE)):
+            away = sums[place] / total
+            slow.append(centre[row] + away)
+            variance.append(max(sums[place + 1] / total - away * away, 0.0))
+        mean_heading = heading + offset
+        self._centre.columns[:, 0] = (centre[0] + n, centre[1] + e, _wrap(mean_heading - shift.turn), *slow)
         self._centre_values.clear()
         return Moments(
             self.names,
-            np.array([north + n, east + e, _wrap(heading + offset), *slow]),
-            covariance,
-            np.array([*variances, *slow_variances]),
+            np.array((north + n, east + e, _wrap(mean_heading), *slow)),
+            np.array((nn, ne, nh, ne, ee, eh, nh, eh, hh)).reshape(3, 3),
+            np.array(variance),
             self.effective_sample_size,
         )
 
@@ -365,28 +356,30 @@ class ParticleFilter(Generic[Control]):
             self._centre_values.update(zip(self.names, self._centre.columns[:, 0].tolist(), strict=True))
         return self._centre_values
 
-    def _pose_sums(
+    def _displaced(self, centre: list[float], shift: Displacement) -> list[float]:
+        """Pose of the displaced centre, rounded to float32 as the kernel will see it."""
+        north, east, heading, *_ = centre
+        sine, cosine = math.sin(heading), math.cos(heading)
+        self._reference[:] = (
+            north + shift.forward * cosine - shift.right * sine,
+            east + shift.forward * sine + shift.right * cosine,
+            heading + shift.turn,
+        )
+        return self._reference.tolist()
+
+    def _sums_about(
         self, shift: Displacement, north: float, east: float, heading: float
     ) -> tuple[list[float], float]:
         """Sums about a reference pose, and how far the circular mean lies from the reference heading."""
         sums = self._moment_sums
-        sums[:] = 0.0
-        columns = self._particles.columns
+        sums.fill(0.0)
+        forward, right, turn = shift
+        columns, weight, references = self._particles.columns, self._weights, self._centre.columns
         for first, last in self._bounds:
-            weights.moments(columns, self._weights, first, last, *shift, north, east, heading, sums)
+            weights.moments(columns, weight, first, last, forward, right, turn, north, east, heading, sums)
+            weights.spread(columns, weight, first, last, references, sums)
         values: list[float] = sums.tolist()
         return values, math.atan2(values[4], values[5])
-
-    def _spread(self, centre: list[float]) -> tuple[list[float], list[float]]:
-        """Mean and variance of every column beside the pose."""
-        sums = self._spread_sums
-        sums[:] = 0.0
-        for first, last in self._bounds:
-            weights.spread(self._particles.columns, self._weights, first, last, self._centre.columns, sums)
-        total = float(self._sums[0])
-        offsets = [(offset / total, square / total) for offset, square in sums[3:].tolist()]
-        means = [reference + offset for reference, (offset, _) in zip(centre[3:], offsets, strict=True)]
-        return means, [max(square - offset * offset, 0.0) for offset, square in offsets]
 
 
 class _Walk:
@@ -433,15 +426,6 @@ class _Walks:
 
 def _wrap(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
-
-
-def _displaced(centre: list[float], shift: Displacement) -> tuple[float, float, float]:
-    """Pose of the displaced centre, rounded to float32 as the kernel will see it."""
-    north, east, heading = centre[:3]
-    sine, cosine = math.sin(heading), math.cos(heading)
-    north += shift.forward * cosine - shift.right * sine
-    east += shift.forward * sine + shift.right * cosine
-    return float(np.float32(north)), float(np.float32(east)), float(np.float32(heading + shift.turn))
 
 
 def _check_shape(names: tuple[str, ...], capacity: int, block: int) -> None:

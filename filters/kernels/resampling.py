@@ -44,7 +44,8 @@ def systematic(weights: Float32Array, total: float, uniform: float, ancestors: I
         ancestors[end] = i
     latest = np.int32(0)
     for m in range(count):
-        latest = max(latest, ancestors[m])
+        ahead = np.int32(ancestors[m] - latest)  # a maximum without a branch, which none could predict
+        latest = np.int32(latest + np.int32(ahead & ~np.int32(ahead >> np.int32(31))))
         ancestors[m] = latest
 
 

@@ -140,7 +140,7 @@ def moments(
     sums[12] = max(sums[12], from_order(widest))
 
 
-@kernel("void(float32[:, ::1], float32[::1], int64, int64, float32[:, ::1], float64[:, ::1])")
+@kernel("void(float32[:, ::1], float32[::1], int64, int64, float32[:, ::1], float64[::1])")
 def spread(
     columns: Float32Array,
     weights: Float32Array,
@@ -149,7 +149,7 @@ def spread(
     references: Float32Array,
     sums: Float64Array,
 ) -> None:
-    """Add each column's weighted offset from its reference, and the square, to its row of ``sums``."""
+    """Add the weighted offset, and its square, of each column beside the pose behind the pose's sums."""
     weight = weights[first:last]
     for row in range(3, columns.shape[0]):
         column = columns[row, first:last]
@@ -161,8 +161,8 @@ def spread(
             wx = float32(weight[i] * x)
             offset += wx
             square += wx * x
-        sums[row, 0] += offset
-        sums[row, 1] += square
+        sums[SUMS + 2 * (row - 3)] += offset
+        sums[SUMS + 2 * (row - 3) + 1] += square
 
 
 @kernel("void(float32[:, ::1], float32[::1], int64, float32, float32, float32, float32, float32[:, ::1])")

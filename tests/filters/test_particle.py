@@ -1,4 +1,4 @@
-"""The particle filter against exact beliefs, a float64 rewriting, and the ways in which such filters break."""
+"""The particle filter against exact beliefs, a plain rewriting, and the ways in which such filters break."""
 
 from __future__ import annotations
 
@@ -333,7 +333,7 @@ def test_resampling_does_not_move_the_belief() -> None:
 
 
 def test_every_block_is_a_fair_sample() -> None:
-    """Sorted particles, resampled: the mean of each block within 1 standard deviation of independent draws."""
+    """Sorted particles, resampled: the mean of each block within 1 sigma of independent draws."""
     count, block = 20_000, 3000
     belief = ParticleFilter(QUIET, capacity=count, seed=1, block=block)
     given = columns(count)

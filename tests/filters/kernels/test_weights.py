@@ -84,10 +84,10 @@ def test_spread() -> None:
     columns = rng.normal(0, 1, (5, 700)).astype(np.float32)
     w = rng.exponential(size=700).astype(np.float32)
     references = np.arange(5, dtype=np.float32)[:, None]
-    sums = np.zeros((5, 2))
+    sums = np.zeros(weights.SUMS + 4)
     weights.spread(columns, w, 0, 100, references, sums)
     weights.spread(columns, w, 100, 700, references, sums)
     offsets = columns.astype(float) - references
-    np.testing.assert_allclose(sums[3:, 0], (w * offsets).sum(1)[3:], rtol=1e-5)
-    np.testing.assert_allclose(sums[3:, 1], (w * offsets**2).sum(1)[3:], rtol=1e-5)
-    assert (sums[:3] == 0.0).all()
+    np.testing.assert_allclose(sums[-4::2], (w * offsets).sum(1)[3:], rtol=1e-5)
+    np.testing.assert_allclose(sums[-3::2], (w * offsets**2).sum(1)[3:], rtol=1e-5)
+    assert (sums[: weights.SUMS] == 0.0).all()
