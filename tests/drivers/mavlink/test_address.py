@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import pty
 import socket
@@ -162,6 +163,13 @@ def test_a_serial_line() -> None:
 def test_what_cannot_be_opened_says_what_would_be_right(url: str, complaint: str) -> None:
     with pytest.raises(LinkError, match=complaint):
         open_port(url)
+
+
+def test_a_web_socket_needs_its_package() -> None:
+    if importlib.util.find_spec("wsproto") is not None:
+        pytest.skip("wsproto is installed")
+    with pytest.raises(LinkError, match="pip install wsproto"):
+        open_port("ws:127.0.0.1:1")
 
 
 @pytest.fixture

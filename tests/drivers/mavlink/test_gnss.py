@@ -98,6 +98,12 @@ def test_no_yaw(ear: Ear, yaw: int) -> None:
     assert ear.refused == {}
 
 
+def test_directions_beyond_a_turn_are_refused(ear: Ear) -> None:
+    (position,) = ear.hear(gps(cog=36_001, yaw=36_001))
+    assert isinstance(position.reading, GeodeticPosition)
+    assert ear.refused == {"GPS_RAW_INT.cog": 1, "GPS_RAW_INT.yaw": 1}
+
+
 def test_the_second_receiver_is_its_own(ear: Ear) -> None:
     second = frame(
         "GPS2_RAW",
