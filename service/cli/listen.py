@@ -12,7 +12,7 @@ NAME = "listen"
 EPILOG = """
 [bold]Examples[/bold]
 
-beliefd listen [dim]· every vehicle that the daemon on this machine knows[/dim]
+beliefd listen [dim]· the vehicle that is live on this machine[/dim]
 
 beliefd listen mower
 
@@ -22,7 +22,7 @@ beliefd listen mower --router tcp/192.168.1.7:7447
 
 def command(
     vehicle: Annotated[
-        str | None, typer.Argument(help="Name of the vehicle; without it: all that are live.")
+        str | None, typer.Argument(help="Name of the vehicle; without it: the only one that is live.")
     ] = None,
     router: Annotated[
         str | None, typer.Option(help="Zenoh endpoint to connect to; default: the daemon on this machine.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -27,6 +28,18 @@ def test_the_keys_are_those_of_the_interface() -> None:
         "beliefd/v1/mower/@live",
     ]
     assert live("beliefd/v1") == "beliefd/v1/*/@live"
+
+
+def test_the_qualities_of_service_are_those_of_the_interface() -> None:
+    priority = zenoh.Priority
+    assert {topic.key: (topic.priority, topic.encoding) for topic in TOPICS} == {
+        "estimate": (priority.REAL_TIME, "application/json;beliefd.Estimate"),
+        "estimate/slow": (priority.DATA, "application/json;beliefd.Estimate"),
+        "particles": (priority.BACKGROUND, "application/octet-stream;beliefd.Cloud"),
+        "budget": (priority.DATA_LOW, "application/json;beliefd.Budget"),
+        "sensors": (priority.DATA_LOW, "application/json;beliefd.Sensors"),
+        "health": (priority.INTERACTIVE_HIGH, "application/json;beliefd.Health"),
+    }
 
 
 @pytest.mark.parametrize("name", ["", "a/b", "a*", "$*", "a#b", "what?", "@mower", "/"])

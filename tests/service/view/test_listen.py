@@ -67,10 +67,16 @@ def test_in_a_pipe_it_writes_a_line_a_time(start: Start, endpoint: str) -> None:
 
 
 def test_a_reader_that_goes_away_is_no_error(start: Start, endpoint: str) -> None:
+    """With a buffered output: what could not be written is still in it when the interpreter ends."""
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     with (
         speaking(start(endpoint)),
         subprocess.Popen(
-            listening("mower", endpoint), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            listening("mower", endpoint),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=buffered,
         ) as process,
     ):
         assert process.stdout is not None
