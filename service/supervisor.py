@@ -93,6 +93,7 @@ class Supervisor:
         self._said = ""
         self._status_due = 0.0
         self._read = time.monotonic()
+        self._unread = False
 
     def run(self) -> int:
         """Supervise until told to stop; return the exit status: 0, or 1 when the loop cannot be started."""
@@ -204,7 +205,8 @@ class Supervisor:
         if child.program.vital and self._notifier.watchdog_period:
             self._notifier.watchdog_within(child.program.start_patience)
         if name == self._plan.publisher:
-            self._read = now
+            # it finds the queue as full as the last one left it, and reads only once it has started
+            self._read = now + (child.program.start_patience if self._unread else 0.0)
             self._plan.call()
 
     def _listen(self, child: Child) -> None:
@@ -288,7 +290,8 @@ class Supervisor:
                 self._said = words
                 self._notifier.status(words)
         own = ProcessStatus("supervisor", os.getpid(), "running", 0, self._kept, resident_bytes(os.getpid()))
-        if self._plan.statuses.send(PROCESSES + msgspec.json.encode([own, *statuses])):
+        self._unread = not self._plan.statuses.send(PROCESSES + msgspec.json.encode([own, *statuses]))
+        if not self._unread:
             self._read = now
         elif now - self._read > UNREAD:
             self._publisher_hangs(now)
