@@ -13,7 +13,7 @@ from sim_vehicle import configuration, realtime, recording, scenarios
 from sim_vehicle.configuration import Listening
 from sim_vehicle.ports import CanPort, PortError, open_can, open_mavlink
 from sim_vehicle.scenario import Scenario
-from sim_vehicle.vehicle import Vehicle
+from sim_vehicle.vehicle import Vehicle, prepare
 
 WRONG_USE = 2
 
@@ -128,6 +128,7 @@ def _drive(
         typer.echo(
             f"{scenario.name}, seed {seed}: MAVLink at {mavlink.address}" + (f", CAN at {bus}" if bus else "")
         )
+        prepare(scenario)
         start = realtime.now()
         vehicle = Vehicle(scenario, seed, start.unix)
         driven = realtime.RealTime(vehicle, start, mavlink, can_port, rows).run(

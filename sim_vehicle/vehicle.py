@@ -8,6 +8,7 @@ same.
 from __future__ import annotations
 
 import heapq
+import importlib
 import itertools
 import math
 from collections.abc import Callable, Iterator
@@ -46,6 +47,12 @@ class Frames:
 
     mavlink: list[Arrival[bytes]] = field(default_factory=list[Arrival[bytes]])
     can: list[Arrival[CanFrame]] = field(default_factory=list[Arrival[CanFrame]])
+
+
+def prepare(scenario: Scenario) -> None:
+    """Load what a vehicle of this scenario needs: dronecan takes most of a second, only a bus needs it."""
+    if scenario.bus is not None:
+        importlib.import_module("sim_vehicle.bus")
 
 
 class Vehicle:
@@ -174,7 +181,7 @@ class Vehicle:
         scenario, chance, settings = self._scenario, self._chance, self._scenario.bus
         if settings is None:
             return
-        # dronecan takes most of a second to load: only a vehicle with a bus waits for it.
+        # Here and not above, for the reason that prepare gives.
         from sim_vehicle.bus import Bus
 
         bus = Bus(settings, scenario.origin, unix, self._send_can)

@@ -9,7 +9,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-LONGEST_WAIT = 10.0
+LONGEST_WAIT = 30.0
 
 
 class Companion:
