@@ -33,12 +33,18 @@ class Odometry:
         if not all(map(math.isfinite, distances)):
             at.refuse("distance")
             return []
+        if self._still(fields.time_usec, distances):
+            return [(at.received, Odometer(distances, self._epoch))]
         if self._stale(fields.time_usec):
             at.refuse("time_usec")
             return []
         self._epoch += self._started_anew(fields.time_usec, at.received, distances)
         self._last = (fields.time_usec, at.received, distances)
         return [(at.microseconds(fields.time_usec), Odometer(distances, self._epoch))]
+
+    def _still(self, stamp: int, distances: tuple[float, ...]) -> bool:
+        """Whether nothing has rolled: some encoders stamp the last edge, and stamp no more while they stand."""
+        return self._last is not None and (stamp, distances) == (self._last[0], self._last[2])
 
     def _stale(self, stamp: int) -> bool:
         """Whether the message repeats the last one, or was overtaken on the way."""
