@@ -1,9 +1,9 @@
 """Deadlines under load: the real daemon at RATE beside a MAVLink link of FLOOD messages/s, for SECONDS.
 
-``python benchmarks/deadline.py --rate 100 --seconds 600 --flood 2000``. One sender process paces frames that were
-packed beforehand (stamps and sums are patched in place); a Zenoh subscriber reads what the daemon says of itself.
-Printed: missed ticks, lateness, use of the budget, drops, particles, memory of every process, and the time from the
-start of the daemon to its first estimate.
+``python benchmarks/deadline.py --rate 100 --seconds 600 --flood 2000``. One sender process paces frames that
+were packed beforehand (stamps and sums are patched in place); a Zenoh subscriber reads what the daemon says
+of itself. Printed: missed ticks, lateness, use of the budget, drops, particles, memory of every process, and
+the time from the start of the daemon to its first estimate.
 """
 
 from __future__ import annotations

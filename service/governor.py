@@ -39,6 +39,10 @@ HEADROOM = 0.9
 """Growth stops at this share of the supply; between it and the supply the count stays as it is."""
 
 
+COLD = 2.0
+"""Scale before the first tick: between ticks the caches belong to others, in the rehearsal they did not."""
+
+
 class Level(IntEnum):
     """How far a tick was degraded, in the declared order; the loop's governor decides the first two."""
 
@@ -109,7 +113,7 @@ class Governor:
         self._smallest = smallest
         self._largest = largest
         self._shapes = dict(shapes)
-        self._scales = {stage: _expecting(1.0) for stage in shapes}
+        self._scales = {stage: _expecting(COLD) for stage in shapes}
         self._fixed: dict[str, RunningQuantile] = {}
         self._limit = self._clamped(self.supply)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from service.governor import WINDOW, Decision, Governor, Level, Shape
+from service.governor import COLD, GROWTH, WINDOW, Decision, Governor, Level, Shape
 
 BUDGET = 4e-3
 SMALLEST, LARGEST = 200, 1_000_000
@@ -114,7 +114,8 @@ def test_grows_slowly_and_shrinks_at_once() -> None:
     machine, governor = Machine(noise=0.0), fresh()
     counts, _ = machine.run(governor, 300)
     grown = counts[1:] / counts[:-1]
-    assert grown.max() <= 1.1001  # counts are whole
+    assert GROWTH == 1.1
+    assert 1.05 < grown.max() <= 1.1001, "counts are whole, and the first guess is low"
     governor.observe("sensing", 100.0, int(counts[-1]))
     for _ in range(3):
         governor.observe("sensing", 100.0, int(counts[-1]))
@@ -159,8 +160,8 @@ def test_never_more_than_the_capacity() -> None:
 
 
 def test_starts_from_what_the_rehearsal_measured() -> None:
-    """Closed form: (budget - overheads) / slopes, before any tick."""
-    expected = (BUDGET - len(STAGES) * OVERHEAD) / PER_PARTICLE
+    """Closed form, before any tick: the rehearsal's line, twice as dear."""
+    expected = (BUDGET - COLD * len(STAGES) * OVERHEAD) / (COLD * PER_PARTICLE)
     assert fresh().decide(LARGEST).count == int(expected)
 
 

@@ -1,4 +1,4 @@
-"""What is asked of the kernel, seen from outside: in processes of their own, with and without the right to it."""
+"""What is asked of the kernel, seen from processes of their own, with and without the right to it."""
 
 from __future__ import annotations
 

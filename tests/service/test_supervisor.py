@@ -167,6 +167,7 @@ def test_sigterm_ends_everything_within_two_seconds(start: Start) -> None:
     assert service.process.returncode == 0
     assert took < 2.0
     assert all(gone(pid) for pid in service.pids)
+    assert "killed" not in service.log.read_text(), "asked to end, not forced"
     service.hear("STOPPING=1")
 
 
@@ -234,6 +235,15 @@ def test_a_loop_that_cannot_start_ends_the_service_with_one(start: Start) -> Non
     log = service.log.read_text()
     assert "loop: 5 starts in a row failed (exit status 3): giving up" in log
     service.hear("STOPPING=1")
+
+
+def test_a_loop_whose_program_is_not_there_is_named(start: Start) -> None:
+    service = start(PUBLISHER, LOOP | {"manner": "absent"}, LINK)
+    service.process.wait(PATIENCE)
+    assert service.process.returncode == 1
+    assert "loop: cannot be started: [Errno 2] No such file or directory: '/nonexistent/python'" in (
+        service.log.read_text()
+    )
 
 
 def test_a_link_that_cannot_start_is_tried_for_ever(start: Start) -> None:

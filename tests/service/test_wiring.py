@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -89,7 +90,7 @@ def test_descriptors_are_all_that_the_command_names(wiring: Wiring) -> None:
         words = list(program.command)
         named = {
             int(word.rpartition("=")[2])
-            for option, word in zip(words, words[1:], strict=False)
+            for option, word in pairwise(words)
             if option in ("--configuration", "--heart", "--publisher", "--link", "--samples", "--estimates")
         }
         assert named == set(program.descriptors)
@@ -123,6 +124,7 @@ def test_another_rate_renews_loop_and_publisher_but_no_link(wiring: Wiring, file
     wiring.reload()
     after = settings(wiring)
     assert {name for name in after if after[name] != before[name]} == {"loop", "publisher"}
+    assert all(configuration_from(program.descriptors[0]).loop.rate == 20.0 for program in wiring.programs())
 
 
 def test_another_address_renews_that_link_but_not_the_other(wiring: Wiring, file: Path) -> None:

@@ -48,7 +48,8 @@ class Plan:
             self.hearts[name] = pair(16 * 1024)
         heart = self.hearts[name]
         outlet = heart.outlet.fileno()
-        command = (sys.executable, str(CHILD), manner, str(outlet), str(os.getpid()))
+        interpreter = "/nonexistent/python" if manner == "absent" else sys.executable
+        command = (interpreter, str(CHILD), manner, str(outlet), str(os.getpid()))
         listened = None if facts.pop("heartless", False) else heart.inlet
         return Program(name, command, (outlet,), manner, listened, **facts)  # type: ignore[arg-type]
 
