@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from filters.kernels import resampling as kernels
 from filters.kernels.resampling import places
 from filters.resampling import systematic
 
@@ -107,6 +108,13 @@ def test_a_float32_sum_that_ends_below_one(uniform: float) -> None:
     assert ancestors.max() <= 998_999
     assert ancestors.min() >= 0
     assert np.bincount(ancestors).max() <= 2
+
+
+def test_what_rounding_leaves_goes_to_the_last_source_with_weight() -> None:
+    """A total that the cumulative sum never reaches: the last positions go to no source of weight zero."""
+    ancestors = np.zeros(100, np.int32)
+    kernels.systematic(np.array([1.0, 1.0, 0.0, 0.0], np.float32), 2.2, 0.5, ancestors)
+    assert set(ancestors.tolist()) == {0, 1}
 
 
 def test_more_and_fewer_than_the_source() -> None:
