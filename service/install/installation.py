@@ -118,12 +118,15 @@ def uninstall(name: str | None, say: Say) -> Names:
     Raises
     ------
     InstallError
-        Not root, or there is no such unit.
+        Not root, or nothing of that name is installed.
     """
     need_root("beliefd service uninstall")
     names = Names.of(name)
+    if not names.unit_file.exists() and not names.configuration.exists():
+        raise InstallError(f"there is neither {names.unit_file} nor {names.configuration}; nothing to remove")
     if not names.unit_file.exists():
-        raise InstallError(f"there is no {names.unit_file}; nothing to remove")
+        say(f"there is no {names.unit_file}; {names.configuration} is kept unless --purge")
+        return names
     call("systemctl", "disable", "--now", names.service)
     names.unit_file.unlink()
     call("systemctl", "daemon-reload")

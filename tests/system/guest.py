@@ -316,8 +316,6 @@ def removal(tally: Tally) -> None:
         expect(
             Path("/var/lib/beliefd").exists() and ROBOT_INSTALLED.exists(), "state or configuration has gone"
         )
-        must(BELIEFD, "service", "install", "--no-start", str(ROBOT), timeout=240)
-        expect(unit("ActiveState") == "inactive", "started in spite of --no-start")
         must(BELIEFD, "service", "uninstall", "--purge")
         left = [
             path for path in ("/var/lib/beliefd", "/etc/beliefd", "/var/cache/beliefd") if Path(path).exists()
