@@ -26,7 +26,7 @@ def command() -> None:
         TextColumn("{task.description}"),
     )
     console = Console()
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=None)
         folder = kernels.warm(
             lambda name, done, total: bar.update(task, description=name, completed=done, total=total)
