@@ -61,7 +61,7 @@ class ParticleFilter(Generic[Control]):
 
     def __init__(
         self,
-        motion: Motion[Control],
+        motion: Motion[Control, Any],
         *,
         capacity: int,
         seed: int,
@@ -156,6 +156,7 @@ class ParticleFilter(Generic[Control]):
         heading = given["heading"]
         self._particles.columns[2, :count] = np.remainder(heading + math.pi, 2.0 * math.pi) - math.pi
         self._centre.columns[2, 0] = math.atan2(np.sin(heading).mean(), np.cos(heading).mean())
+        self._motion.start()
         self._recount(count)
         self._level()
 
@@ -176,7 +177,8 @@ class ParticleFilter(Generic[Control]):
         """
         if not 0.0 <= duration < math.inf:
             raise ValueError(f"predict: duration must be finite and not negative, got {duration} s")
-        self._motion.move(self._centre, 0, 1, self._no_noise, control, duration)
+        move = self._motion.begin(control, duration)
+        self._motion.move(self._centre, 0, 1, self._no_noise, move)
         self._centre_values.clear()
         self._step += 1
         step = self._step & 0xFFFFFFFF
@@ -185,7 +187,7 @@ class ParticleFilter(Generic[Control]):
         for first, last in self._bounds:
             for pair, key in enumerate(self._keys):
                 random.normal_pairs(first, last, step, key, noise, 2 * pair)
-            self._motion.move(self._particles, first, last, noise, control, duration)
+            self._motion.move(self._particles, first, last, noise, move)
             for walk in due:
                 walk.apply(self._particles, first, last, noise, step)
 
@@ -237,7 +239,8 @@ class ParticleFilter(Generic[Control]):
         """Weighted mean and covariance, of the particles displaced each along its own heading.
 
         The heading's mean is circular; the covariance is about that mean, with wrapped differences. The
-        centre that innovations are measured from becomes the mean found here.
+        variance of a marginalised column is the spread of the particles' means and what their paths leave open.
+        The centre that innovations are measured from becomes the mean found here.
         """
         self._settle()
         shift = STILL if displacement is None else displacement
@@ -260,6 +263,8 @@ class ParticleFilter(Generic[Control]):
             away = sums[place] / total
             slow.append(centre[row] + away)
             variance.append(max(sums[place + 1] / total - away * away, 0.0))
+        for name, given_path in self._motion.conditional_variances.items():
+            variance[self._particles.rows[name]] += given_path
         mean_heading = heading + offset
         self._centre.columns[:, 0] = (centre[0] + n, centre[1] + e, _wrap(mean_heading - shift.turn), *slow)
         self._centre_values.clear()

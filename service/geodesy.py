@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pymap3d
 
@@ -18,6 +18,12 @@ class Geodetic(NamedTuple):
     latitude: float
     longitude: float
     altitude: float
+
+
+def _floats(triple: Any) -> tuple[float, float, float]:
+    """Return what pymap3d gives (it ships no types) as plain numbers."""
+    first, second, third = triple
+    return float(first), float(second), float(third)
 
 
 class _Anchor(NamedTuple):
@@ -47,8 +53,7 @@ class LocalFrame:
         self, latitude: float, longitude: float, altitude: float
     ) -> tuple[float, float, float]:
         """Return (north, east, down), metres, of a point given in radians and metres."""
-        north, east, down = pymap3d.geodetic2ned(latitude, longitude, altitude, *self.origin, deg=False)
-        return float(north), float(east), float(down)
+        return _floats(pymap3d.geodetic2ned(latitude, longitude, altitude, *self.origin, deg=False))
 
     def geodetic_from_ned(self, north: float, east: float, down: float) -> Geodetic:
         """Return the point (radians, metres) that lies ``north``, ``east``, ``down`` metres from the origin."""
@@ -65,8 +70,7 @@ class LocalFrame:
         )
 
     def _exact(self, north: float, east: float, down: float) -> Geodetic:
-        latitude, longitude, altitude = pymap3d.ned2geodetic(north, east, down, *self.origin, deg=False)
-        return Geodetic(float(latitude), float(longitude), float(altitude))
+        return Geodetic(*_floats(pymap3d.ned2geodetic(north, east, down, *self.origin, deg=False)))
 
     def _anchor_at(self, north: float, east: float, down: float) -> _Anchor:
         half = ANCHOR_REACH / 2

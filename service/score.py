@@ -10,6 +10,7 @@ import csv
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,7 +116,7 @@ def score(track: Track, truth: Truth) -> Score:
     return Score(
         rmse_m=math.sqrt(float(np.mean(error**2))),
         mean_m=float(error.mean()),
-        p95_m=float(np.quantile(error, 0.95)),
+        p95_m=float(cast(Any, np.quantile(error, 0.95))),
         max_m=float(error.max()),
         coverage_95=float(np.mean(nees <= CHI_SQUARE_95)),
         nees_mean=float(nees.mean()),

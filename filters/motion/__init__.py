@@ -2,6 +2,6 @@
 
 from filters.motion.model import Motion
 from filters.motion.slow import RandomWalk
-from filters.motion.unicycle import Unicycle, UnicycleControl
+from filters.motion.unicycle import Unicycle, UnicycleControl, UnicycleStep
 
-__all__ = ["Motion", "RandomWalk", "Unicycle", "UnicycleControl"]
+__all__ = ["Motion", "RandomWalk", "Unicycle", "UnicycleControl", "UnicycleStep"]

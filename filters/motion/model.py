@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol, TypeVar
 
 from filters.kernels.compile import Float32Array
@@ -9,9 +10,10 @@ from filters.motion.slow import RandomWalk
 from filters.particle_set import ParticleSet
 
 Control = TypeVar("Control", contravariant=True)
+Step = TypeVar("Step")
 
 
-class Motion(Protocol[Control]):
+class Motion(Protocol[Control, Step]):
     """The named requirement of a motion model.
 
     A model is one file: this class, and beside it one kernel over the columns it names. It draws no random
@@ -34,15 +36,33 @@ class Motion(Protocol[Control]):
         """Those of its columns that wander slowly; the filter walks them."""
         ...
 
-    def move(
-        self,
-        particles: ParticleSet,
-        first: int,
-        last: int,
-        noise: Float32Array,
-        control: Control,
-        duration: float,
-    ) -> None:
+    @property
+    def conditional_variances(self) -> Mapping[str, float]:
+        """Variance of each marginalised column given a particle's path, the same for all particles."""
+        ...
+
+    def start(self) -> None:
+        """Forget what was learned since the last start: the particles are drawn anew."""
+        ...
+
+    def begin(self, control: Control, duration: float) -> Step:
+        """Prepare one prediction: whatever is the same for all particles, once.
+
+        Parameters
+        ----------
+        control : Control
+            What was commanded or measured of the motion over ``duration``.
+        duration : float
+            Seconds.
+
+        Raises
+        ------
+        ValueError
+            The control is not finite.
+        """
+        ...
+
+    def move(self, particles: ParticleSet, first: int, last: int, noise: Float32Array, step: Step) -> None:
         """Move the particles ``first`` to ``last`` in place.
 
         Parameters
@@ -53,14 +73,7 @@ class Motion(Protocol[Control]):
             Bounds of the block.
         noise : (>= noises, >= last - first) float32
             Standard normals; column 0 belongs to particle ``first``.
-        control : Control
-            What was commanded or measured of the motion over ``duration``.
-        duration : float
-            Seconds.
-
-        Raises
-        ------
-        ValueError
-            The control is not finite.
+        step : Step
+            Of :meth:`begin`.
         """
         ...

@@ -1,4 +1,11 @@
-"""Unicycle: a ground vehicle that rolls forward and turns; its odometer's and gyro's errors are states."""
+"""Unicycle: a ground vehicle that rolls forward and turns, with the errors of its odometer and its gyro as states.
+
+The errors are not sampled but *marginalised* (Rao-Blackwell; Schön, Gustafsson, Nordlund, "Marginalized particle
+filters for mixed linear/nonlinear state-space models", IEEE TSP 53(7), 2005): given a particle's path, gyro bias b and
+odometry scale s are linear and Gaussian. Each particle carries its own means, and because the coefficients of b and s
+(the duration and the distance) are the same for all particles, so are the two variances. Sampled as mere columns, such
+states freeze: resampling leaves a few ancestors' values, and their spread says nothing of what is known.
+"""
 
 from __future__ import annotations
 
@@ -25,26 +32,46 @@ class UnicycleControl(NamedTuple):
         Rolled forward, metres, as the odometer counts them.
     turn : float
         Integrated yaw rate, radians, as the gyro reads it: bias included.
+    distance_sigma, turn_sigma : float
+        Standard deviations beyond the model's own, metres and radians: for a stretch that was not measured.
     """
 
     distance: float
     turn: float
+    distance_sigma: float = 0.0
+    turn_sigma: float = 0.0
+
+
+class UnicycleStep(NamedTuple):
+    """One prediction, ready for the kernel: the same numbers for every particle."""
+
+    distance: float
+    turn: float
+    duration: float
+    distance_sigma: float
+    turn_sigma: float
+    bias_gain: float
+    scale_gain: float
 
 
 class Unicycle:
-    """Noisy unicycle motion along the chord of an arc.
+    """Noisy unicycle motion along the chord of an arc, with marginalised gyro bias and odometry scale.
 
-    With d the distance and t the turn of the control over a time T, and n1, n2 standard normals::
+    With d the distance and t the turn of the control over a time T, a particle's means b and s of bias and scale, their
+    shared variances P and S, and n1, n2 standard normals::
 
-        d' = odometry_scale · d + sqrt(speed_noise² T + slip_noise² |d|) n1
-        t' = t - gyro_bias · T  + sqrt(yaw_rate_noise² T + turn_noise² |t|) n2
+        P += gyro_bias_walk² T,  S += odometry_scale_walk² T
+        Q = yaw_rate_noise² T + turn_noise² |t|,  R = speed_noise² T + slip_noise² |d|
+        d' = s d + sqrt(R + d² S) n1,  s += d S / sqrt(R + d² S) n1,  S = S R / (R + d² S)
+        t' = t - b T + sqrt(Q + T² P) n2,  b -= T P / sqrt(Q + T² P) n2,  P = P Q / (Q + T² P)
         north   += d' cos(heading + t'/2)
         east    += d' sin(heading + t'/2)
         heading += t'
 
-    The noises are densities, so the belief after a second is the same whatever the rate of the ticks. The
-    chord of an arc is shorter than the arc by the factor sin(t'/2) / (t'/2), which is left out: 4e-6 at 0.01
-    rad.
+    The turn and the distance are drawn with the uncertainty of bias and scale in them, and the draw is then taken as a
+    measurement of both: a Kalman filter of one dimension each, given the particle's path. The noises are densities, so
+    the belief after a second is the same whatever the rate of the ticks. The chord of an arc is shorter than the arc by
+    the factor sin(t'/2) / (t'/2), which is left out: 4e-6 at 0.01 rad.
 
     Parameters
     ----------
@@ -60,6 +87,8 @@ class Unicycle:
         Of the distance for each square root of a metre rolled, m/√m.
     turn_noise : float
         Of the turn for each square root of a radian turned, rad/√rad.
+    gyro_bias_sigma, odometry_scale_sigma : float
+        What bias (rad/s) and scale may be off by at the start, beyond the spread of the particles' own values.
 
     Raises
     ------
@@ -69,6 +98,7 @@ class Unicycle:
 
     names = ("north", "east", "heading", GYRO_BIAS, ODOMETRY_SCALE)
     noises = 2
+    walks: tuple[RandomWalk, ...] = ()
 
     def __init__(
         self,
@@ -78,6 +108,8 @@ class Unicycle:
         odometry_scale_walk: float,
         slip_noise: float = 0.0,
         turn_noise: float = 0.0,
+        gyro_bias_sigma: float = 0.0,
+        odometry_scale_sigma: float = 0.0,
     ) -> None:
         densities = {
             "speed_noise": speed_noise,
@@ -86,6 +118,8 @@ class Unicycle:
             "odometry_scale_walk": odometry_scale_walk,
             "slip_noise": slip_noise,
             "turn_noise": turn_noise,
+            "gyro_bias_sigma": gyro_bias_sigma,
+            "odometry_scale_sigma": odometry_scale_sigma,
         }
         for name, density in densities.items():
             if not 0.0 <= density < math.inf:
@@ -94,37 +128,67 @@ class Unicycle:
         self.yaw_rate_noise = yaw_rate_noise
         self.slip_noise = slip_noise
         self.turn_noise = turn_noise
-        self.walks = (RandomWalk(GYRO_BIAS, gyro_bias_walk), RandomWalk(ODOMETRY_SCALE, odometry_scale_walk))
+        self.gyro_bias_walk = gyro_bias_walk
+        self.odometry_scale_walk = odometry_scale_walk
+        self.gyro_bias_sigma = gyro_bias_sigma
+        self.odometry_scale_sigma = odometry_scale_sigma
+        self._bias_variance = gyro_bias_sigma**2
+        self._scale_variance = odometry_scale_sigma**2
 
-    def move(
-        self,
-        particles: ParticleSet,
-        first: int,
-        last: int,
-        noise: Float32Array,
-        control: UnicycleControl,
-        duration: float,
-    ) -> None:
-        """Move a block of particles in place; see :class:`filters.motion.Motion`."""
-        distance, turn = control
-        if not (math.isfinite(distance) and math.isfinite(turn)):
-            raise ValueError(f"unicycle: distance and turn must be finite, got {distance} m and {turn} rad")
-        distance_variance = self.speed_noise**2 * duration + self.slip_noise**2 * abs(distance)
-        turn_variance = self.yaw_rate_noise**2 * duration + self.turn_noise**2 * abs(turn)
-        roll(
-            particles.columns,
-            noise,
-            first,
-            last,
+    def start(self) -> None:
+        """Forget what was learned of bias and scale."""
+        self._bias_variance = self.gyro_bias_sigma**2
+        self._scale_variance = self.odometry_scale_sigma**2
+
+    @property
+    def conditional_variances(self) -> dict[str, float]:
+        """Variances of bias and scale given a particle's path; the spread of the particles' means comes on top."""
+        return {GYRO_BIAS: self._bias_variance, ODOMETRY_SCALE: self._scale_variance}
+
+    def noise_variances(self, control: UnicycleControl, duration: float) -> tuple[float, float]:
+        """Return the variances of the distance (m²) and of the turn (rad²) that a control leaves open: R and Q."""
+        distance, turn, distance_sigma, turn_sigma = control
+        return (
+            self.speed_noise**2 * duration + self.slip_noise**2 * abs(distance) + distance_sigma**2,
+            self.yaw_rate_noise**2 * duration + self.turn_noise**2 * abs(turn) + turn_sigma**2,
+        )
+
+    def begin(self, control: UnicycleControl, duration: float) -> UnicycleStep:
+        """Prepare one prediction and update the shared variances; see :class:`filters.motion.Motion`."""
+        if not all(map(math.isfinite, control)):
+            raise ValueError(f"unicycle: every number of the control must be finite, got {control}")
+        distance, turn = control.distance, control.turn
+        distance_variance, turn_variance = self.noise_variances(control, duration)
+        bias_variance = self._bias_variance + self.gyro_bias_walk**2 * duration
+        scale_variance = self._scale_variance + self.odometry_scale_walk**2 * duration
+        turn_total = turn_variance + duration**2 * bias_variance
+        distance_total = distance_variance + distance**2 * scale_variance
+        turn_sigma, distance_sigma = math.sqrt(turn_total), math.sqrt(distance_total)
+        if turn_total > 0.0:
+            self._bias_variance = bias_variance * turn_variance / turn_total
+        if distance_total > 0.0:
+            self._scale_variance = scale_variance * distance_variance / distance_total
+        return UnicycleStep(
             distance,
             turn,
             duration,
-            math.sqrt(distance_variance),
-            math.sqrt(turn_variance),
+            distance_sigma,
+            turn_sigma,
+            -duration * bias_variance / turn_sigma if turn_total > 0.0 else 0.0,
+            distance * scale_variance / distance_sigma if distance_total > 0.0 else 0.0,
         )
 
+    def move(
+        self, particles: ParticleSet, first: int, last: int, noise: Float32Array, step: UnicycleStep
+    ) -> None:
+        """Move a block of particles in place; see :class:`filters.motion.Motion`."""
+        roll(particles.columns, noise, first, last, *step)
 
-@kernel("void(float32[:, ::1], float32[:, ::1], int64, int64, float32, float32, float32, float32, float32)")
+
+@kernel(
+    "void(float32[:, ::1], float32[:, ::1], int64, int64, float32, float32, float32, float32, float32, float32,"
+    "float32)"
+)
 def roll(
     columns: Float32Array,
     noise: Float32Array,
@@ -135,8 +199,10 @@ def roll(
     duration: float,
     distance_sigma: float,
     turn_sigma: float,
+    bias_gain: float,
+    scale_gain: float,
 ) -> None:
-    """Move every particle of a block along its chord."""
+    """Move every particle of a block along its chord, and learn its bias and scale from the draw."""
     north = columns[0, first:last]
     east = columns[1, first:last]
     heading = columns[2, first:last]
@@ -152,3 +218,5 @@ def roll(
         north[i] += d * c
         east[i] += d * s
         heading[i] = wrapped(float32(h + t))
+        bias[i] += bias_gain * turn_noise[i]
+        scale[i] += scale_gain * distance_noise[i]

@@ -21,6 +21,7 @@ from drivers.sample import (
     Sample,
     Velocity,
 )
+from filters.sensing import Heading as HeadingModel
 from filters.sensing import (
     HeadingMeasurement,
     Position,
@@ -28,7 +29,6 @@ from filters.sensing import (
     RangeMeasurement,
     VelocityMeasurement,
 )
-from filters.sensing import Heading as HeadingModel
 from filters.sensing import Range as RangeModel
 from filters.sensing import Sensor as SensorModel
 from filters.sensing import Velocity as VelocityModel
@@ -252,7 +252,7 @@ def _measure_velocity(sensor: BoundSensor, reading: Any, place: Place) -> Any:
     return VelocityMeasurement(reading.north, reading.east, speed, sensor.spread(reading.sigma, place))
 
 
-def _measure_range(sensor: BoundSensor, reading: Range, place: Place) -> Any:
+def _measure_range(sensor: BoundSensor, reading: Any, place: Place) -> Any:
     if not 0.0 < reading.distance < LONGEST_RANGE:
         return "out_of_range"
     where = beacon_position(reading, sensor.beacons, place.frame)

@@ -154,7 +154,10 @@ class TotalTrack(Track):
         self._last: tuple[object, tuple[float, ...]] | None = None
 
     def append(self, time: int, distance: tuple[float, ...], epoch: object) -> bool:
-        """Append the wheels' totals at ``time``; the vehicle's is their mean. ``epoch`` is whatever tells counters apart."""
+        """Append the wheels' totals at ``time``; the vehicle's is their mean.
+
+        ``epoch`` is whatever tells one counter from another; between two of them the distance is unknown.
+        """
         previous, latest = self._last, self.latest
         if previous is None or previous[0] != epoch or len(previous[1]) != len(distance):
             done = self.extend(time, 0.0, 0.0 if latest is None else (time - latest) / SECOND)

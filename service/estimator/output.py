@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from filters.belief import Displacement, Moments
 from filters.density.gaussian import radius
 from filters.motion.prediction import process_covariance, velocity_moments
-from filters.belief import Displacement, Moments
+from filters.motion.unicycle import UnicycleControl
 from filters.particle import ParticleFilter
 from service.estimate import Estimate, Triangle, Triple
 from service.estimator.vehicle import Vehicle
@@ -42,7 +43,7 @@ class Output:
         Of the last :meth:`at`; the cloud is carried by the same.
     """
 
-    def __init__(self, vehicle: Vehicle, belief: ParticleFilter) -> None:
+    def __init__(self, vehicle: Vehicle, belief: ParticleFilter[UnicycleControl]) -> None:
         self._vehicle = vehicle
         self._belief = belief
         self._biases = (0.0, 1.0)

@@ -22,10 +22,7 @@ class Anchor(NamedTuple):
 
 def slow_sigmas(configuration: Configuration) -> dict[str, tuple[float, float]]:
     """Return mean and standard deviation at the start of every slow state, by column name."""
-    sigmas = {
-        "gyro_bias": (0.0, configuration.motion.gyro_bias_sigma),
-        "odometry_scale": (1.0, configuration.motion.odometry_scale_sigma),
-    }
+    sigmas = {"gyro_bias": (0.0, 0.0), "odometry_scale": (1.0, 0.0)}  # marginalised: the motion model knows
     for sensor in configuration.sensor:
         if "scale" in sensor.estimate:
             sigmas[f"{sensor.kind}_scale"] = (1.0, sensor.scale_sigma)

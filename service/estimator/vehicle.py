@@ -28,6 +28,9 @@ UNKNOWN_SPEED = 2.0
 UNKNOWN_YAW_RATE = 0.5
 """rad/s; the same for a silent gyro."""
 
+PERSISTENCE = 2.0
+"""Seconds for which such an unknown motion goes on in one direction: it adds up faster than noise."""
+
 CLIMB = 0.05
 """m per √s; how fast the height wanders, uncorrected."""
 
@@ -60,6 +63,8 @@ class Vehicle:
             settings.odometry_scale_walk,
             slip_noise=settings.slip_noise,
             turn_noise=settings.turn_noise,
+            gyro_bias_sigma=settings.gyro_bias_sigma,
+            odometry_scale_sigma=settings.odometry_scale_sigma,
         )
         self.controls = Controls(
             settings.wheel_radius, settings.wheel_track, settings.speed_from, settings.yaw_rate_from
@@ -70,18 +75,25 @@ class Vehicle:
             for state in sensor.estimate
             if state != "delay"
         ]
-        self._settings = settings
         self._height: KalmanFilter | None = None
 
     # --- on the plane -------------------------------------------------------------------------------------------
 
-    def predict(self, belief: ParticleFilter, start: int, end: int) -> None:
+    def predict(self, belief: ParticleFilter[UnicycleControl], start: int, end: int) -> None:
         """Move the particles by what the controls say of ``start`` to ``end`` (nanoseconds)."""
         duration = (end - start) / SECOND
-        distance, turn = self.controls.distance(start, end), self.controls.turn(start, end)
-        belief.predict(UnicycleControl(distance.total, turn.total), duration)
+        belief.predict(self._control(start, end), duration)
         if self._height is not None:
             self._height.predict(np.eye(1), np.array([[CLIMB**2 * duration]]))
+
+    def _control(self, start: int, end: int) -> UnicycleControl:
+        distance, turn = self.controls.distance(start, end), self.controls.turn(start, end)
+        return UnicycleControl(
+            distance.total,
+            turn.total,
+            UNKNOWN_SPEED * math.sqrt(2.0 * PERSISTENCE * max(0.0, distance.unknown)),
+            UNKNOWN_YAW_RATE * math.sqrt(2.0 * PERSISTENCE * max(0.0, turn.unknown)),
+        )
 
     def displacement(self, start: int, end: int, biases: tuple[float, float]) -> Displacement:
         """Return the body's rigid motion from ``start`` to ``end``, corrected by (gyro bias, odometry scale)."""
@@ -100,19 +112,12 @@ class Vehicle:
 
     def noise(self, start: int, end: int) -> IntervalNoise:
         """Return the process noise of an interval, as the motion model has it."""
-        settings, duration = self._settings, (end - start) / SECOND
-        distance, turn = self.controls.distance(start, end), self.controls.turn(start, end)
-        along = settings.speed_noise**2 * duration + settings.slip_noise**2 * abs(distance.total)
-        heading = settings.yaw_rate_noise**2 * duration + settings.turn_noise**2 * abs(turn.total)
-        return IntervalNoise(
-            along + (UNKNOWN_SPEED * distance.unknown) ** 2,
-            heading + (UNKNOWN_YAW_RATE * turn.unknown) ** 2,
-        )
+        return IntervalNoise(*self.motion.noise_variances(self._control(start, end), (end - start) / SECOND))
 
     @property
     def speed_noise(self) -> float:
         """Standard deviation of the speed that is published, m/s."""
-        return self._settings.speed_noise
+        return self.motion.speed_noise
 
     # --- height -------------------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from drivers.logs import LogReader
 from drivers.logs.candump import CandumpReader
 from drivers.logs.tlog import TlogReader
 from drivers.sample import Sample
-from service.config import CanLink, MavlinkLink, Configuration
+from service.config import CanLink, Configuration, MavlinkLink
 from service.links import can_settings, mavlink_settings
 
 

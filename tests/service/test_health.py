@@ -9,7 +9,12 @@ SECOND = 1_000_000_000
 
 
 def facts(
-    now: float, radius: float | None = 1.0, *, started: bool = True, missing: list[str] | None = None, afforded: int = 5000
+    now: float,
+    radius: float | None = 1.0,
+    *,
+    started: bool = True,
+    missing: list[str] | None = None,
+    afforded: int = 5000,
 ) -> Facts:
     return Facts(round(now * SECOND), started, missing or [], radius, afforded, 200)
 
@@ -24,7 +29,9 @@ def agreeing(monitor: HealthMonitor, start: float, seconds: float, surprise: flo
 
 def test_waits_for_data_and_says_for_what() -> None:
     monitor = HealthMonitor()
-    assert monitor.judge(facts(0, None, started=False, missing=["odometry", "range/a"])) is HealthState.WAITING
+    assert (
+        monitor.judge(facts(0, None, started=False, missing=["odometry", "range/a"])) is HealthState.WAITING
+    )
     assert "odometry" in monitor.reason
     assert "range/a" in monitor.reason
 

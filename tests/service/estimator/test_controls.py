@@ -182,4 +182,4 @@ def test_memory_is_bounded() -> None:
         controls.forget(k * 10 * MS - SECOND)
     turn = controls.turn(20_000 * 10 * MS - SECOND, 19_999 * 10 * MS)
     assert math.isclose(turn.total, 0.0099, rel_tol=0.02)
-    assert len(controls._turn._times) < 400  # noqa: SLF001
+    assert len(controls._turn._times) < 400
