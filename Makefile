@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test lint format bench system docs clean
+.PHONY: help install demo test lint format bench system docs figures clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -46,6 +46,9 @@ system: install ## the daemon under real systemd with a real vcan0, in a guest
 docs: $(INSTALLED) ## the pages that are generated
 	$(BIN)/python -m service.config.reference > docs/configuration.md
 	$(BIN)/python -m service.publish.reference > docs/wire.md
+
+figures: install ## the figures of docs/filters.md, from the filters themselves
+	$(BIN)/python docs/figures.py
 
 clean: ## remove everything that was made
 	rm -rf $(VENV) .vm build dist .pytest_cache .ruff_cache .hypothesis .coverage
