@@ -10,7 +10,6 @@ import csv
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,13 +109,15 @@ def score(track: Track, truth: Truth) -> Score:
     if not known.any():
         return UNSCORED
     dn, de = (track.north - north)[known], (track.east - east)[known]
-    error = np.hypot(dn, de)
+    error: NDArray[np.float64] = np.hypot(dn, de)
     nn, ne, ee = track.covariance[known].T
-    nees = (ee * dn**2 - 2 * ne * dn * de + nn * de**2) / np.maximum(nn * ee - ne**2, 1e-12)
+    nees: NDArray[np.float64] = (ee * dn**2 - 2 * ne * dn * de + nn * de**2) / np.maximum(
+        nn * ee - ne**2, 1e-12
+    )
     return Score(
         rmse_m=math.sqrt(float(np.mean(error**2))),
         mean_m=float(error.mean()),
-        p95_m=float(cast(Any, np.quantile(error, 0.95))),
+        p95_m=float(np.quantile(error, 0.95)),
         max_m=float(error.max()),
         coverage_95=float(np.mean(nees <= CHI_SQUARE_95)),
         nees_mean=float(nees.mean()),

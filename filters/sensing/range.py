@@ -54,7 +54,9 @@ class Range:
     outliers : float
         Fraction of measurements that say nothing; 0 for a pure Gaussian.
     span : float
-        Longest distance that the sensor can report, metres; a longer one is refused.
+        How widely outliers scatter, metres.
+    longest : float
+        Farthest that the sensor can measure, metres; a longer distance is refused.
     scale, bias : str, optional
         Slow states to multiply the distance by, and to add to it.
 
@@ -71,18 +73,22 @@ class Range:
         span: float = 200.0,
         scale: str | None = None,
         bias: str | None = None,
+        longest: float = 100_000.0,
     ) -> None:
         check("range", sigma, outliers, span)
+        if not 0.0 < longest < math.inf:
+            raise ValueError(f"range: longest must be positive and finite, got {longest}")
         self.sigma = sigma
         self.outliers = outliers
         self.span = span
+        self.longest = longest
         self.scale = scale
         self.bias = bias
 
     def refusal(self, measurement: RangeMeasurement) -> str | None:
-        """Refuse a distance not positive or longer than ``span``, and a sigma that is not positive."""
-        if not 0.0 < measurement.distance <= self.span:
-            return f"distance must lie in (0, {self.span:g}] m, got {measurement.distance:g}"
+        """Refuse a distance not positive or longer than ``longest``, and a sigma that is not positive."""
+        if not 0.0 < measurement.distance <= self.longest:
+            return f"distance must lie in (0, {self.longest:g}] m, got {measurement.distance:g}"
         return sigma_refusal(measurement.sigma)
 
     def weigh(self, particles: ParticleSet, first: int, last: int, measurement: RangeMeasurement) -> float:

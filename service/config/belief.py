@@ -138,6 +138,10 @@ class Motion(Section):
     """Distance between the left and the right wheels, metres: yaw rate from two wheels that differ."""
     wheel_radius: Positive | None = None
     """Radius of the driven wheels, metres: speed from motor revolutions (esc.Status, RPM)."""
+    throttle_channel: Annotated[Whole, Field(ge=1, le=32)] | None = None
+    """Actuator that drives, counted from 1: its command is the speed when nothing better is heard."""
+    throttle_speed: Positive = 1.0
+    """Speed at a command of 1 on throttle_channel, m/s."""
 
 
 class Sensor(Section):

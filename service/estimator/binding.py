@@ -37,9 +37,6 @@ from service.estimator.controls import Controls
 from service.geodesy import LocalFrame
 
 SECOND = 1_000_000_000
-LONGEST_RANGE = 100_000.0
-"""Metres; a beacon further off is a fault of the reading."""
-
 MAGNETIC_INTERVAL = SECOND // 5
 """A magnetometer's errors hardly change between readings: five a second carry all that it knows."""
 
@@ -56,8 +53,8 @@ the variance that makes all of them together worth one independent reading per t
 TIMING = 0.02
 """Seconds by which a stamp may be off after its clock was mapped: at speed v, v times this many metres."""
 
-SPAN = {"position": 1000.0, "velocity": 100.0, "range": 2000.0, "heading": 2 * math.pi}
-"""How far an outlier may lie from the truth, per dimension: m, m/s, m, rad."""
+SPAN = {"position": 1000.0, "velocity": 100.0, "range": 200.0, "heading": 2 * math.pi}
+"""How widely outliers scatter, per dimension: m, m/s, m, rad."""
 
 SLOWEST_COURSE = 0.3
 """m/s; below this the direction of a measured velocity is noise."""
@@ -253,8 +250,6 @@ def _measure_velocity(sensor: BoundSensor, reading: Any, place: Place) -> Any:
 
 
 def _measure_range(sensor: BoundSensor, reading: Any, place: Place) -> Any:
-    if not 0.0 < reading.distance < LONGEST_RANGE:
-        return "out_of_range"
     where = beacon_position(reading, sensor.beacons, place.frame)
     if where is None:
         return "no_beacon"

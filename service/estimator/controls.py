@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from drivers.sample import (
+    ActuatorCommand,
     Attitude,
     Inertial,
     MotionCommand,
@@ -210,6 +211,13 @@ WHEELS_RANK = 150
 """Yaw rate from two wheels: after any gyro and the autopilot's attitude, before what was merely commanded."""
 
 
+class Throttle(NamedTuple):
+    """The actuator that drives: its channel, from 1, and the speed (m/s) at a command of 1."""
+
+    channel: int
+    speed: float
+
+
 class Controls:
     """Distance and turn of a ground vehicle over time.
 
@@ -221,6 +229,8 @@ class Controls:
         Metres between the left wheel (the first) and the right one; makes two wheels a yaw rate.
     speed_from, yaw_rate_from : str
         ``auto``, or the one source (as the wire names it) that may speak.
+    throttle : Throttle or None
+        Which actuator drives; its command is the last resort for the speed.
     """
 
     def __init__(
@@ -229,11 +239,13 @@ class Controls:
         wheel_track: float | None = None,
         speed_from: str = "auto",
         yaw_rate_from: str = "auto",
+        throttle: Throttle | None = None,
     ) -> None:
         self.wheel_radius = wheel_radius
         self.wheel_track = wheel_track
         self.speed_from = speed_from
         self.yaw_rate_from = yaw_rate_from
+        self.throttle = throttle
         self.out_of_order = 0
         self._motors: dict[int, float] = {}
         self._difference: tuple[int, float, int] | None = None
@@ -297,7 +309,17 @@ class Controls:
             if reading.yaw_rate is not None:
                 self._take_yaw_rate(sample, reading.yaw_rate, 200)
             return True
+        if isinstance(reading, ActuatorCommand):
+            self._take_command(sample, reading)
+            return True
         return False
+
+    def _take_command(self, sample: Sample, reading: ActuatorCommand) -> None:
+        throttle = self.throttle
+        if throttle is not None and throttle.channel <= len(reading.channels):
+            command = reading.channels[throttle.channel - 1]
+            if command is not None:
+                self._take_speed(sample, command * throttle.speed, 4)
 
     def _turn_of_wheels(self, sample: Sample, reading: Odometer) -> None:
         """Feed the yaw rate of a vehicle whose left and right wheels roll different ways."""

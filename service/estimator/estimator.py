@@ -53,6 +53,9 @@ HEADING_BIN = 0.1
 KLD_ERROR = 0.01
 """Nats. The bins count the pose only; the slow states beside it want several particles in each of its bins."""
 
+START_COUNT = 10_000
+"""Particles of a start about a known place; one over an area takes all that can be afforded."""
+
 DEMAND_INTERVAL = SECOND // 5
 GROWTH = 1.25
 """The set grows between resamplings only if the demand is this much larger than the count."""
@@ -227,6 +230,9 @@ class Estimator:
 
     def _take_evidence(self, time: int, measured: Measurement, record: SensorRecord) -> None:
         evidence = self._filter.weigh(measured.model, measured.value)
+        if not evidence.accepted:
+            record.refused["invalid"] += 1
+            return
         surprise = measured.surprise(evidence.log_mean)
         record.innovation = evidence.innovation
         record.last = time
@@ -293,7 +299,8 @@ class Estimator:
         return []
 
     def _start(self, time: int, anchor: Anchor | None, afforded: int) -> None:
-        count = max(self.configuration.budget.particles_min, min(afforded, self._filter.capacity))
+        wanted = self._filter.capacity if anchor is None else START_COUNT
+        count = max(self.configuration.budget.particles_min, min(afforded, wanted))
         self._filter.initialize(draw(self.configuration, self._filter.names, count, self.seed, anchor))
         self._vehicle.stand_at(anchor)
         self._belief_time = time

@@ -18,7 +18,7 @@ from filters.motion.slow import RandomWalk
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from service.config import Configuration
-from service.estimator.controls import SECOND, Controls
+from service.estimator.controls import SECOND, Controls, Throttle
 from service.estimator.start import Anchor
 from service.geodesy import LocalFrame
 
@@ -67,7 +67,13 @@ class Vehicle:
             odometry_scale_sigma=settings.odometry_scale_sigma,
         )
         self.controls = Controls(
-            settings.wheel_radius, settings.wheel_track, settings.speed_from, settings.yaw_rate_from
+            settings.wheel_radius,
+            settings.wheel_track,
+            settings.speed_from,
+            settings.yaw_rate_from,
+            None
+            if settings.throttle_channel is None
+            else Throttle(settings.throttle_channel, settings.throttle_speed),
         )
         self.slow_states = [
             RandomWalk(f"{sensor.kind}_{state}", SENSOR_WALK)

@@ -214,7 +214,7 @@ def test_innovation(sensor: Any, measurement: Any, innovation: float) -> None:
 @pytest.mark.parametrize(
     ("sensor", "measurement", "what"),
     [
-        (Range(1.0, span=50.0), RangeMeasurement(50.1, 0.0, 0.0), "distance"),
+        (Range(1.0, longest=50.0), RangeMeasurement(50.1, 0.0, 0.0), "distance"),
         (Range(1.0), RangeMeasurement(0.0, 0.0, 0.0), "distance"),
         (Range(1.0), RangeMeasurement(1.0, 0.0, 0.0, 0.0, 0.0), "sigma"),
         (Position(1.0), PositionMeasurement(0.0, 0.0, -1.0), "sigma"),
@@ -234,6 +234,7 @@ def test_refusals(sensor: Any, measurement: Any, what: str) -> None:
         (lambda: Range(0.0), "sigma"),
         (lambda: Range(1.0, outliers=1.0), "outliers"),
         (lambda: Range(1.0, span=math.inf), "span"),
+        (lambda: Range(1.0, longest=0.0), "longest"),
         (lambda: Position(math.nan), "sigma"),
         (lambda: Position(1.0, lever=(math.nan, 0.0)), "lever"),
         (lambda: Velocity(-1.0), "sigma"),

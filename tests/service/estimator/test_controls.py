@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.sample import (
+    ActuatorCommand,
     AnyReading,
     Attitude,
     Inertial,
@@ -21,7 +22,7 @@ from drivers.sample import (
     Sample,
     Speed,
 )
-from service.estimator.controls import GAP, SECOND, SILENCE, Controls, RateTrack, TotalTrack
+from service.estimator.controls import GAP, SECOND, SILENCE, Controls, RateTrack, Throttle, TotalTrack
 
 MS = 1_000_000
 
@@ -169,6 +170,18 @@ def test_commands_speak_only_when_nothing_measures() -> None:
     controls.take(sample(2 * SECOND, Speed(1.0), "sample/dvl"))
     controls.take(sample(2 * SECOND, Rotation(0.2), "sample/gyro"))
     assert controls.sources == ("sample/dvl", "sample/gyro")
+
+
+def test_an_actuator_speaks_last_and_only_when_it_is_named() -> None:
+    command = ActuatorCommand((0.0, None, 0.5))
+    unnamed, named = Controls(), Controls(throttle=Throttle(3, 4.0))
+    for controls in (unnamed, named):
+        for k in range(11):
+            controls.take(sample(k * 100 * MS, command, "SERVO_OUTPUT_RAW"))
+    assert unnamed.sources[0] is None
+    assert named.distance(0, SECOND).total == pytest.approx(2.0)
+    named.take(sample(SECOND, Odometer((0.0,)), "WHEEL_DISTANCE"))
+    assert named.sources[0] == "WHEEL_DISTANCE"
 
 
 def test_what_is_no_control_is_left_to_others() -> None:
