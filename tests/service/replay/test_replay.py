@@ -163,22 +163,7 @@ def test_the_command_prints_one_json_object(drive: Path, tmp_path: Path) -> None
     )
     result = json.loads(done.stdout)
     run = result["runs"][0]
-    for name in [
-        "seed",
-        "rmse_m",
-        "mean_m",
-        "p95_m",
-        "max_m",
-        "coverage_95",
-        "nees_mean",
-        "final_m",
-        "particles_mean",
-        "late_samples",
-        "dropped",
-        "health",
-        "seconds",
-        "real_time_factor",
-    ]:
-        assert name in run
+    assert set(run) >= {"seed", "rmse_m", "mean_m", "p95_m", "max_m", "coverage_95", "nees_mean", "final_m"}
+    assert set(run) >= {"particles_mean", "late_samples", "dropped", "health", "seconds", "real_time_factor"}
     assert result["summary"]["seeds"] == 1
     assert (tmp_path / "estimates_seed0.csv").is_file()
