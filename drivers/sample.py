@@ -18,7 +18,9 @@ import msgspec
 Vector = tuple[float, float, float]
 
 
-class Reading(msgspec.Struct, frozen=True, gc=False, omit_defaults=True, forbid_unknown_fields=True, tag_field="kind"):
+class Reading(
+    msgspec.Struct, frozen=True, gc=False, omit_defaults=True, forbid_unknown_fields=True, tag_field="kind"
+):
     """What was measured or commanded; each subclass is one kind, named by its tag."""
 
 
@@ -233,11 +235,16 @@ class LinkReport(msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag=
     messages, samples : int
         Messages understood, samples made of them.
     malformed : dict[str, int]
-        What was refused, by kind: ``bad_checksum``, ``GPS_RAW_INT.latitude``, ``truncated_transfer`` …
+        What was broken and refused, by kind: ``bad_checksum``, ``GPS_RAW_INT.latitude``,
+        ``truncated_transfer`` …
+    unusable : dict[str, int]
+        Well-formed readings that say nothing usable, by field: no fix, out of range, a sensor not fitted.
     ignored : int
         Messages that are well-formed but not wanted (other system, component or kind).
     dropped : int
         Samples that the loop's queue had no room for.
+    lost : int
+        Messages of the vehicle that never arrived, by the gaps in its senders' numbering (MAVLink).
     offset, jitter : float or None
         Of the clock mapping, seconds: sensor clock to host clock, and the spread of arrival about it.
     """
@@ -248,8 +255,10 @@ class LinkReport(msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag=
     messages: int = 0
     samples: int = 0
     malformed: dict[str, int] = {}
+    unusable: dict[str, int] = {}
     ignored: int = 0
     dropped: int = 0
+    lost: int = 0
     opened: int = 0
     clock: str = ""
     offset: float | None = None

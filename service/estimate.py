@@ -219,11 +219,17 @@ class LinkStatus(msgspec.Struct, frozen=True, gc=False):
     messages, samples : int
         Messages understood, samples made of them.
     malformed : dict[str, int]
-        What was refused, by kind: ``bad_checksum``, ``GPS_RAW_INT.fix_type`` …
+        What was broken and refused, by kind: ``bad_checksum``, ``GPS_RAW_INT.latitude`` …
+    unusable : dict[str, int]
+        Well-formed readings that say nothing usable: no fix, out of range, a sensor not fitted. By field:
+        ``GPS_RAW_INT.fix_type`` …
     ignored : int
         Messages that are well-formed but not wanted: another system, component or kind.
     dropped : int
         Samples that the loop's queue had no room for.
+    lost : int
+        Messages of the vehicle that never arrived whole, by the gaps in the numbering of their senders
+        (MAVLink). Numbers wrap at 256, so a long outage loses more.
     clock : str
         How the sensor's clock is mapped to the host's: ``timesync``, ``envelope`` …
     offset, jitter : float or None
@@ -238,8 +244,10 @@ class LinkStatus(msgspec.Struct, frozen=True, gc=False):
     messages: int
     samples: int
     malformed: dict[str, int]
+    unusable: dict[str, int]
     ignored: int
     dropped: int
+    lost: int
     clock: str
     offset: float | None
     jitter: float | None

@@ -6,7 +6,7 @@ from collections import Counter
 
 from drivers.can.dsdl import MalformedPayload, Message
 from drivers.can.frame import CanFrame
-from drivers.can.readings import DATA_TYPES, Refused, readings_of
+from drivers.can.readings import DATA_TYPES, PassedOver, Refused, readings_of
 from drivers.can.settings import CanSettings
 from drivers.can.transfer import Reassembler, Transfer
 from drivers.clock import US_56, ClockMap
@@ -30,6 +30,8 @@ class Decoder:
     ----------
     messages : int
         Transfers understood.
+    unusable : Counter[str]
+        Fields by which a sound message said that it has nothing usable: ``gnss.Fix2.status``.
     """
 
     def __init__(self, link_name: str, settings: CanSettings) -> None:
@@ -39,6 +41,7 @@ class Decoder:
         self._refused: Counter[str] = Counter()
         self._clocks: dict[int, ClockMap] = {}
         self.messages = 0
+        self.unusable: Counter[str] = Counter()
 
     @property
     def malformed(self) -> Counter[str]:
@@ -83,10 +86,14 @@ class Decoder:
 
     def _usable(self, transfer: Transfer, message: Message) -> list[AnyReading]:
         readings: list[AnyReading] = []
+        name = transfer.data_type.name
         for reading in readings_of(transfer.data_type, message, self._settings):
+            if isinstance(reading, PassedOver):
+                self.unusable[f"{name}.{reading.field}"] += 1
+                continue
             field = reading.field if isinstance(reading, Refused) else implausible(reading)
             if field is not None:
-                self._refused[f"{transfer.data_type.name}.{field}"] += 1
+                self._refused[f"{name}.{field}"] += 1
             elif not isinstance(reading, Refused):
                 readings.append(reading)
         return readings

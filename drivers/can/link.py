@@ -227,6 +227,7 @@ class CanLink:
             messages=self._decoder.messages,
             samples=self._samples,
             malformed=dict(self._decoder.malformed + self._refused),
+            unusable=dict(self._decoder.unusable),
             ignored=self._decoder.ignored + self._ignored,
             opened=self._opened,
             clock="arrival" if clock is None else clock.method,

@@ -1,6 +1,7 @@
 """DroneCAN messages as readings: one small generator for each message type that beliefd understands.
 
-Each yields what the message says, in SI units, or :class:`Refused` with the field that says nothing usable.
+Each yields what the message says, in SI units, or :class:`Refused` with a field that is broken, or
+:class:`PassedOver` with the field by which a sound message says that it has nothing for us.
 Whether the numbers can be true is judged afterwards, for all drivers alike, by :mod:`drivers.plausibility`.
 """
 
@@ -25,12 +26,18 @@ from drivers.sample import (
 
 
 class Refused(NamedTuple):
-    """A field of a message that cannot be used."""
+    """A field of a message that is broken."""
 
     field: str
 
 
-Readings = Iterator[AnyReading | Refused]
+class PassedOver(NamedTuple):
+    """A field by which a message that is sound says nothing usable: no fix, too far, another unit."""
+
+    field: str
+
+
+Readings = Iterator[AnyReading | Refused | PassedOver]
 
 _TWO_DIMENSIONS = 2  # gnss.Fix2 STATUS_2D_FIX
 _THREE_DIMENSIONS = 3  # STATUS_3D_FIX
@@ -66,7 +73,7 @@ def _deviation(variances: Sequence[float]) -> float | None:
 def _fix(message: Message, _settings: CanSettings) -> Readings:
     status = message["status"]
     if status < _TWO_DIMENSIONS:
-        yield Refused("status")
+        yield PassedOver("status")
         return
     solid = status >= _THREE_DIMENSIONS
     covariance = message["covariance"]
@@ -133,7 +140,7 @@ def _orientation(message: Message, settings: CanSettings) -> int:
 
 def _clearance(message: Message, settings: CanSettings) -> Readings:
     if message["reading_type"] != _VALID_RANGE:
-        yield Refused("reading_type")
+        yield PassedOver("reading_type")
         return
     yield Clearance(distance=message["range"], orientation=_orientation(message, settings))
 
@@ -145,12 +152,12 @@ def _motor(message: Message, _settings: CanSettings) -> Readings:
 def _throttles(message: Message, _settings: CanSettings) -> Readings:
     commands = message["cmd"]
     if not commands:
-        yield Refused("cmd")
+        yield PassedOver("cmd")
         return
     yield ActuatorCommand(tuple(c / (_FULL_FORWARD if c > 0 else _FULL_REVERSE) for c in commands))
 
 
-def _actuator(command: Message) -> float | Refused | None:
+def _actuator(command: Message) -> float | Refused | PassedOver | None:
     """Return one command in -1…1, ``None`` for a servo without pulses."""
     value = command["command_value"]
     if command["command_type"] == _PULSE_WIDTH:
@@ -158,7 +165,7 @@ def _actuator(command: Message) -> float | Refused | None:
             return None
         value = (value - _PULSE_CENTRE) / _PULSE_HALF_RANGE
     elif command["command_type"] != _UNITLESS:
-        return Refused("command_type")
+        return PassedOver("command_type")
     return value if -1.0 <= value <= 1.0 else Refused("command_value")
 
 
@@ -167,7 +174,7 @@ def _actuators(message: Message, _settings: CanSettings) -> Readings:
     channels: dict[int, float | None] = {}
     for command in message["commands"]:
         value = _actuator(command)
-        if isinstance(value, Refused):
+        if isinstance(value, Refused | PassedOver):
             yield value
         else:
             channels[command["actuator_id"]] = value

@@ -126,6 +126,7 @@ class CandumpReader:
             messages=sum(decoder.messages for decoder in decoders),
             samples=self._samples,
             malformed=dict(sum((decoder.malformed for decoder in decoders), self._refused.copy())),
+            unusable=dict(sum((decoder.unusable for decoder in decoders), Counter[str]())),
             ignored=self._skipped + sum(decoder.ignored for decoder in decoders),
             opened=1,
         )

@@ -165,6 +165,7 @@ class TlogReader:
             messages=decoder.messages,
             samples=decoder.samples,
             malformed=dict(self._faults + stamps + decoder.malformed),
+            unusable=dict(decoder.unusable),
             ignored=unwanted + decoder.ignored.total(),
             opened=1,
             clock=clocks.boot.method if clocks else "",

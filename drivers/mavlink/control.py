@@ -26,7 +26,7 @@ def position_target(fields: Any, at: Moment) -> list[Timed]:
     """
     frame: int = fields.coordinate_frame
     if frame not in NED_FRAMES and frame not in BODY_FRAMES:
-        at.refuse("coordinate_frame")
+        at.pass_over("coordinate_frame")
         return []
     velocity: Vector | None = None
     if not fields.type_mask & IGNORE_HORIZONTAL:

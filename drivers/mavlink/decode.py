@@ -75,7 +75,9 @@ class Decoder:
     wanted : frozenset[int]
         Ids of the messages that it can use; others need not be decoded.
     malformed : Counter[str]
-        Fields that were refused, by ``MESSAGE.field``.
+        Fields that were refused as broken, by ``MESSAGE.field``.
+    unusable : Counter[str]
+        Fields by which a sound message said that it has nothing usable, by ``MESSAGE.field``.
     ignored : Counter[str]
         Well-formed messages from others than the vehicle, by message.
     messages, samples : int
@@ -95,6 +97,7 @@ class Decoder:
         self._autopilot_at: tuple[int, int] | None = None
         self.wanted = frozenset(IDENTIFIERS[name] for name in self._makers)
         self.malformed: Counter[str] = Counter()
+        self.unusable: Counter[str] = Counter()
         self.ignored: Counter[str] = Counter()
         self.messages = 0
         self.samples = 0
@@ -121,7 +124,7 @@ class Decoder:
         if handler is None:
             handler = self._handlers[name, system, component] = maker()
         clocks = self.clocks(system, component)
-        moment = Moment(name, received_ns, clocks, self.autopilot, self.malformed)
+        moment = Moment(name, received_ns, clocks, self.autopilot, self.malformed, self.unusable)
         samples: list[Sample] = []
         for time, reading in handler(fields, moment):
             wrong = implausible(reading)

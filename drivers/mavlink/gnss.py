@@ -29,7 +29,7 @@ class Receiver:
     """GPS_RAW_INT 24 and GPS2_RAW 124 of one receiver.
 
     In an outage an autopilot goes on sending the last fix with its old stamp: a stamp that repeats is
-    refused. ``eph`` and ``epv`` are dilutions, not metres, and are not used; a sigma is given where ``h_acc``
+    passed over. ``eph`` and ``epv`` are dilutions, not metres, and are not used; a sigma is given where ``h_acc``
     says one.
     """
 
@@ -39,10 +39,10 @@ class Receiver:
     def __call__(self, fields: Any, at: Moment) -> list[Timed]:
         """Return position, velocity and heading of a new fix of two dimensions or more."""
         if fields.fix_type < FIX_2D:
-            at.refuse("fix_type")
+            at.pass_over("fix_type")
             return []
         if fields.time_usec and fields.time_usec == self._last_stamp:
-            at.refuse("time_usec")
+            at.pass_over("time_usec")
             return []
         self._last_stamp = fields.time_usec
         time = at.microseconds(fields.time_usec)
@@ -90,7 +90,7 @@ class Receiver:
 def global_origin(fields: Any, at: Moment) -> list[Timed]:
     """GPS_GLOBAL_ORIGIN 49: 0, 0 was not set. Its time is when it was heard: an origin does not age."""
     if fields.latitude == 0 and fields.longitude == 0:
-        at.refuse("latitude")
+        at.pass_over("latitude")
         return []
     origin = Origin(fields.latitude * DEGREE_E7, fields.longitude * DEGREE_E7, fields.altitude * MILLIMETRE)
     return [(at.received, origin)]

@@ -50,7 +50,7 @@ def highres_imu(fields: Any, at: Moment) -> list[Timed]:
     Units beyond the first (``id``) see the same motion: used beside it they would count twice.
     """
     if fields.id != 0:
-        at.refuse("id")
+        at.pass_over("id")
         return []
     updated: int = fields.fields_updated
     rate = force = field = None
@@ -79,10 +79,10 @@ def highres_imu(fields: Any, at: Moment) -> list[Timed]:
 def raw_imu(fields: Any, at: Moment) -> list[Timed]:
     """RAW_IMU 27: ArduPilot scales it like SCALED_IMU; from others it is counts of an unknown scale."""
     if at.autopilot != ARDUPILOT:
-        at.refuse("autopilot")
+        at.pass_over("autopilot")
         return []
     if fields.id != 0:
-        at.refuse("id")
+        at.pass_over("id")
         return []
     time = at.microseconds(fields.time_usec)
     return [(time, reading) for reading in _thousandths(fields, at)]

@@ -127,6 +127,7 @@ class MavlinkLink:
             messages=decoder.messages,
             samples=decoder.samples,
             malformed=dict(self._scanner.faults + self._refused + decoder.malformed),
+            unusable=dict(decoder.unusable),
             ignored=self._ignored + decoder.ignored.total(),
             opened=self._opened,
             clock=clocks.boot.method if clocks else "",

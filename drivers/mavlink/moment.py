@@ -1,4 +1,4 @@
-"""What a handler is given beside the fields: when they came, the sender's clocks, where to refuse."""
+"""What a handler is given beside the fields: when they came, the sender's clocks, what to count."""
 
 from __future__ import annotations
 
@@ -25,20 +25,31 @@ class Moment:
         MAV_AUTOPILOT of the vehicle; ``None`` before its first heartbeat.
     """
 
-    __slots__ = ("_clocks", "_refused", "autopilot", "name", "received")
+    __slots__ = ("_clocks", "_passed_over", "_refused", "autopilot", "name", "received")
 
     def __init__(
-        self, name: str, received: int, clocks: DeviceClocks, autopilot: int | None, refused: Counter[str]
+        self,
+        name: str,
+        received: int,
+        clocks: DeviceClocks,
+        autopilot: int | None,
+        refused: Counter[str],
+        passed_over: Counter[str],
     ) -> None:
         self.name = name
         self.received = received
         self.autopilot = autopilot
         self._clocks = clocks
         self._refused = refused
+        self._passed_over = passed_over
 
     def refuse(self, field: str) -> None:
-        """Count a field that cannot be used, under ``MESSAGE.field``."""
+        """Count a field that is broken (no number, impossible), under ``MESSAGE.field``."""
         self._refused[f"{self.name}.{field}"] += 1
+
+    def pass_over(self, field: str) -> None:
+        """Count a field by which a sound message says that it has nothing for us, under ``MESSAGE.field``."""
+        self._passed_over[f"{self.name}.{field}"] += 1
 
     def boot_ms(self, stamp: int) -> int:
         """Map ``time_boot_ms``, which wraps after 49.7 days."""

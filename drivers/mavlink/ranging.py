@@ -24,7 +24,7 @@ class Beacons:
     def __call__(self, fields: Any, at: Moment) -> list[Timed]:
         """Return the range; where the beacon says so, with its place."""
         if fields.range in (0, UNKNOWN_32):
-            at.refuse("range")
+            at.pass_over("range")
             return []
         latitude = longitude = altitude = None
         if fields.lat != UNKNOWN_POSITION and fields.lon != UNKNOWN_POSITION and (fields.lat or fields.lon):
@@ -57,10 +57,10 @@ def distance_sensor(fields: Any, at: Moment) -> list[Timed]:
     distance: int = fields.current_distance
     beyond = fields.max_distance > 0 and distance >= fields.max_distance
     if distance == 0 or distance <= fields.min_distance or beyond:
-        at.refuse("out_of_range")
+        at.pass_over("out_of_range")
         return []
     if fields.signal_quality == SIGNAL_INVALID:
-        at.refuse("signal_quality")
+        at.pass_over("signal_quality")
         return []
     variance: int = fields.covariance
     sigma = None if variance in (0, COVARIANCE_UNKNOWN) else math.sqrt(variance) * CENTIMETRE

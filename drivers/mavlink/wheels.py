@@ -36,7 +36,7 @@ class Odometry:
         if self._still(fields.time_usec, distances):
             return [(at.received, Odometer(distances, self._epoch))]
         if self._stale(fields.time_usec):
-            at.refuse("time_usec")
+            at.pass_over("time_usec")
             return []
         self._epoch += self._started_anew(fields.time_usec, at.received, distances)
         self._last = (fields.time_usec, at.received, distances)
@@ -76,9 +76,12 @@ class Tachometers:
         for index, (name, rpm) in enumerate((("rpm1", fields.rpm1), ("rpm2", fields.rpm2))):
             if rpm == NO_SENSOR:
                 continue
-            self._turned[index] |= rpm != 0.0 and math.isfinite(rpm)
-            if self._turned[index] and math.isfinite(rpm):
+            if not math.isfinite(rpm):
+                at.refuse(name)
+                continue
+            self._turned[index] |= rpm != 0.0
+            if self._turned[index]:
                 readings.append((at.received, MotorSpeed(index, rpm * RPM)))
             else:
-                at.refuse(name)
+                at.pass_over(name)
         return readings

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from service.replay.run import Plan, Run
+from service.replay.run import Plan, Run, counts
 from service.replay.seeds import replay_seeds, summary
 from service.replay.site import setting_of
 from service.replay.sources import LogError
@@ -110,13 +110,16 @@ def _show_details(run: Run, console: Console) -> None:
     for name, (value, sigma) in run.biases.items():
         console.print(f"  {name} at the end: {value:.5f} ± {sigma:.5f}", highlight=False)
     for name, (accepted, refused) in run.sensors.items():
-        lost = ", ".join(f"{count} {reason}" for reason, count in refused.items())
-        console.print(f"  {name}: {accepted} used" + (f"; refused: {lost}" if lost else ""), highlight=False)
+        console.print(
+            f"  {name}: {accepted} used" + (f"; refused: {counts(refused)}" if refused else ""),
+            highlight=False,
+        )
     for link in run.links:
-        lost = ", ".join(f"{count} {kind}" for kind, count in link.malformed.items())
         console.print(
             f'  link "{link.link}": {link.messages} messages, {link.samples} samples'
-            + (f"; malformed: {lost}" if lost else ""),
+            + (f"; lost on the way: {link.lost}" if link.lost else "")
+            + (f"; malformed: {counts(link.malformed)}" if link.malformed else "")
+            + (f"; not usable: {counts(link.unusable)}" if link.unusable else ""),
             highlight=False,
         )
     if run.score.rmse_m is None:

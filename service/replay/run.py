@@ -222,10 +222,15 @@ def nothing_in(readers: list[LogReader], logs: tuple[Path, ...]) -> str:
     said: list[str] = []
     for path, reader in zip(logs, readers, strict=True):
         report = reader.report()
-        lost = ", ".join(f"{count} {kind}" for kind, count in report.malformed.items())
         said.append(
             f"{path}: no usable sample in it ({report.messages} messages read, {report.ignored} not wanted"
-            + (f"; refused: {lost}" if lost else "")
+            + (f"; refused: {counts(report.malformed)}" if report.malformed else "")
+            + (f"; not usable: {counts(report.unusable)}" if report.unusable else "")
             + ")"
         )
     return "; ".join(said)
+
+
+def counts(of: dict[str, int]) -> str:
+    """Return counts by kind in words: ``4 GPS_RAW_INT.fix_type, 2 RPM.rpm1``."""
+    return ", ".join(f"{count} {kind}" for kind, count in of.items())

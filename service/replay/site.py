@@ -8,8 +8,10 @@ down and changed.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from drivers.sample import GeodeticPosition, Heading, LocalPosition, Range, Velocity
 from service.config import CanLink, Configuration, Link, MavlinkLink, Sensor, Site, Vehicle, load, site
@@ -24,6 +26,12 @@ _KINDS: tuple[tuple[str, tuple[type, ...]], ...] = (
     ("range", (Range,)),
     ("heading", (Heading,)),
 )
+_MEASURED = frozenset(reading for _, readings in _KINDS for reading in readings)
+
+PROMPT = 0.97
+"""Share of the measurements that a filled-in horizon waits for."""
+
+LONGEST_HORIZON_MS = 3000.0
 
 
 @dataclass(frozen=True)
@@ -92,13 +100,51 @@ def _filled(partial: Site, logs: tuple[Path, ...], notes: list[str]) -> Configur
         notes.extend(f'link filled in: "{link.name}" ({link.kind})' for link in links)
     if partial.sensor:
         return bare
-    sensors = _sensors_of(bare, logs)
+    contents = _contents_of(bare, logs)
+    sensors = _sensors_of(contents)
     for sensor in sensors:
         words = f"sensor filled in from the log: {sensor.kind}"
         if sensor.delay_ms:
             words += f", delay_ms = {sensor.delay_ms:.0f} (SIM_STATE seen: ArduPilot's simulator)"
         notes.append(words + ("".join(f', estimate = ["{state}"]' for state in sensor.estimate)))
-    return partial.configuration(vehicle, links, sensors)
+    filled = partial.configuration(vehicle, links, sensors)
+    if "loop" in partial.model_fields_set or contents.horizon_ms <= filled.loop.horizon_ms:
+        return filled
+    notes.append(
+        f"horizon_ms = {contents.horizon_ms:.0f} filled in from the log: its measurements arrive that late"
+    )
+    loop = filled.loop.model_copy(update={"horizon_ms": contents.horizon_ms})
+    return filled.model_copy(update={"loop": loop})
+
+
+class Contents(NamedTuple):
+    """What a pass over the logs tells: the kinds of reading, whether a simulator wrote them, how late they come."""
+
+    heard: set[type]
+    simulated: bool
+    horizon_ms: float
+
+
+def _contents_of(configuration: Configuration, logs: tuple[Path, ...]) -> Contents:
+    readers = [open_log(log, configuration) for log in logs]
+    heard: set[type] = set()
+    latencies: list[int] = []
+    for sample in merged(readers):
+        kind = type(sample.reading)
+        heard.add(kind)
+        if kind in _MEASURED:
+            latencies.append(sample.received - sample.time)
+    simulated = any("SIM_STATE" in reader.kinds() for reader in readers)
+    return Contents(heard, simulated, _horizon_for(latencies, SITL_GNSS_DELAY_MS if simulated else 0.0))
+
+
+def _horizon_for(latencies: list[int], delay_ms: float) -> float:
+    """Return the horizon, ms, that ``PROMPT`` of the measurements keep, in steps of 50 and within bounds."""
+    if not latencies:
+        return 0.0
+    ranked = sorted(latencies)
+    latest = ranked[min(len(ranked) - 1, int(PROMPT * len(ranked)))] / 1e6 + delay_ms
+    return min(LONGEST_HORIZON_MS, 50.0 * math.ceil(latest / 50.0))
 
 
 def _links_of(logs: tuple[Path, ...]) -> tuple[Link, ...]:
@@ -112,14 +158,11 @@ def _links_of(logs: tuple[Path, ...]) -> tuple[Link, ...]:
     return tuple(links.values())
 
 
-def _sensors_of(configuration: Configuration, logs: tuple[Path, ...]) -> tuple[Sensor, ...]:
-    readers = [open_log(log, configuration) for log in logs]
-    heard = {type(sample.reading) for sample in merged(readers)}
-    simulated = any("SIM_STATE" in reader.kinds() for reader in readers)
+def _sensors_of(contents: Contents) -> tuple[Sensor, ...]:
     sensors: list[Sensor] = []
     for kind, readings in _KINDS:
-        if heard.intersection(readings):
-            delay = SITL_GNSS_DELAY_MS if simulated and kind in ("position", "velocity") else 0.0
+        if contents.heard.intersection(readings):
+            delay = SITL_GNSS_DELAY_MS if contents.simulated and kind in ("position", "velocity") else 0.0
             estimate = ("scale",) if kind == "range" else ()
             sensors.append(Sensor.model_validate({"kind": kind, "delay_ms": delay, "estimate": estimate}))
     return tuple(sensors)

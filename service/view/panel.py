@@ -39,6 +39,7 @@ _BUDGET_WIDTH = 38
 _BUDGET_ROWS = 13
 _BAR = 16
 _WIDE = 56
+_WIDE_COLUMNS, _NARROW_COLUMNS = 6, 4
 
 
 class Screen:
@@ -213,13 +214,14 @@ def _sources(known: Known, width: int) -> RenderableType:
     if known.sensors is None:
         return Text("nothing about links and sensors has arrived", "grey62")
     table = Table.grid(padding=(0, 1))
-    columns = 6 if width >= _WIDE else 4
+    columns = _WIDE_COLUMNS if width >= _WIDE else _NARROW_COLUMNS
     table.add_column(no_wrap=True, overflow="ellipsis", max_width=max(8, width - 7 * (columns - 1)))
     for _ in range(columns - 1):
         table.add_column(justify="right", no_wrap=True)
-    table.add_row(*(Text(heading, "grey62") for heading in ("link", "1/s", "state", "bad")))
+    headings = ("link", "1/s", "state", "bad", "empty", "lost")
+    table.add_row(*(Text(heading, "grey62") for heading in headings[:columns]))
     for link in known.sensors.links:
-        table.add_row(*_link(known, link))
+        table.add_row(*_link(known, link)[:columns])
     headings = ("sensor", "Hz", "innov.", "age s", "used", "refused")
     table.add_row(*(Text(heading, "grey62") for heading in headings[:columns]))
     for sensor in known.sensors.sensors:
@@ -227,12 +229,20 @@ def _sources(known: Known, width: int) -> RenderableType:
     return table
 
 
-def _link(known: Known, link: LinkStatus) -> tuple[Text, str, Text, str]:
+def _link(known: Known, link: LinkStatus) -> tuple[Text, str, Text, str, str, str]:
+    """Return one row; what is honestly empty (no fix, out of range) is in a column apart from what is bad."""
     style = "green" if link.state == "up" else "red" if link.state == "retrying" else "yellow"
     rate = known.message_rate(link)
     name = Text.assemble((link.name, "bold"), " ", (link.reason, "grey62"))
     refused = sum(link.malformed.values()) + link.dropped
-    return name, UNKNOWN if rate is None else f"{rate:.0f}", Text(link.state, style), str(refused)
+    return (
+        name,
+        UNKNOWN if rate is None else f"{rate:.0f}",
+        Text(link.state, style),
+        str(refused),
+        str(sum(link.unusable.values())),
+        str(link.lost),
+    )
 
 
 def _sensor(sensor: SensorStatus) -> tuple[Text, str, str, Text, str, str]:

@@ -41,11 +41,18 @@ def test_keeps_the_last_report(queue: Pair) -> None:
     inlet = Inlet("bus", queue.inlet)
     assert inlet.status(0).state == "starting"
     assert inlet.status(0).age is None
-    queue.outlet.send(encode(LinkReport("bus", "retrying", "port taken", malformed={"crc": 3}, dropped=7)))
+    queue.outlet.send(
+        encode(
+            LinkReport(
+                "bus", "retrying", "port taken", malformed={"crc": 3}, unusable={"fix": 9}, dropped=7, lost=4
+            )
+        )
+    )
     queue.outlet.send(batch(1_000_000_000))
     inlet.drain(lambda _: None, FOREVER)
     status = inlet.status(3_000_000_005)
     assert (status.state, status.reason, status.malformed) == ("retrying", "port taken", {"crc": 3})
+    assert (status.unusable, status.lost) == ({"fix": 9}, 4)
     assert inlet.dropped == status.dropped == 7
     assert status.age == pytest.approx(2.0)
 

@@ -39,6 +39,10 @@ class Ear:
     def refused(self) -> dict[str, int]:
         return dict(self.decoder.malformed)
 
+    @property
+    def passed_over(self) -> dict[str, int]:
+        return dict(self.decoder.unusable)
+
 
 @pytest.fixture
 def listen() -> Callable[..., Ear]:

@@ -38,9 +38,10 @@ def test_frames(ear: Ear, frame_id: int, body: bool) -> None:
     assert sample.reading.body is body
 
 
-def test_a_frame_that_is_neither_is_refused(ear: Ear) -> None:
+def test_a_frame_that_is_neither_is_passed_over(ear: Ear) -> None:
     assert ear.hear(target(0, frame_id=0)) == []
-    assert ear.refused == {"POSITION_TARGET_LOCAL_NED.coordinate_frame": 1}
+    assert ear.passed_over == {"POSITION_TARGET_LOCAL_NED.coordinate_frame": 1}
+    assert ear.refused == {}
 
 
 def test_what_the_mask_ignores_is_none(ear: Ear) -> None:

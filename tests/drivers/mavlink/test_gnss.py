@@ -40,7 +40,8 @@ def test_dilution_is_not_an_accuracy(ear: Ear) -> None:
 @pytest.mark.parametrize("fix", [0, 1])
 def test_no_fix_is_no_sample(ear: Ear, fix: int) -> None:
     assert ear.hear(gps(fix=fix)) == []
-    assert ear.refused == {"GPS_RAW_INT.fix_type": 1}
+    assert ear.passed_over == {"GPS_RAW_INT.fix_type": 1}
+    assert ear.refused == {}
 
 
 def test_a_flat_fix_has_no_altitude(ear: Ear) -> None:
@@ -54,7 +55,8 @@ def test_a_frozen_fix_is_used_once(ear: Ear) -> None:
     assert len(ear.hear(gps(time_usec=5_000_000))) == 2
     assert ear.hear(gps(time_usec=5_000_000)) == []
     assert len(ear.hear(gps(time_usec=5_200_000))) == 2
-    assert ear.refused == {"GPS_RAW_INT.time_usec": 1}
+    assert ear.passed_over == {"GPS_RAW_INT.time_usec": 1}
+    assert ear.refused == {}
 
 
 def test_a_receiver_without_a_clock_is_timed_by_arrival(ear: Ear) -> None:
@@ -125,4 +127,5 @@ def test_the_origin(ear: Ear) -> None:
         pytest.approx(584.0),
     )
     assert ear.hear(frame("GPS_GLOBAL_ORIGIN", 0, 0, 0, 0)) == []
-    assert ear.refused == {"GPS_GLOBAL_ORIGIN.latitude": 1}
+    assert ear.passed_over == {"GPS_GLOBAL_ORIGIN.latitude": 1}
+    assert ear.refused == {}

@@ -42,9 +42,10 @@ def test_an_altitude_above_the_ellipsoid_needs_the_geoid(ear: Ear, listen: Calla
 
 
 @pytest.mark.parametrize("range_mm", [0, 0xFFFFFFFF])
-def test_no_range_is_refused(ear: Ear, range_mm: int) -> None:
+def test_no_range_is_passed_over(ear: Ear, range_mm: int) -> None:
     assert ear.hear(beacon(range_mm=range_mm)) == []
-    assert ear.refused == {"RANGING_BEACON.range": 1}
+    assert ear.passed_over == {"RANGING_BEACON.range": 1}
+    assert ear.refused == {}
 
 
 @pytest.mark.parametrize("accuracy", [0, 0xFFFFFFFF])
@@ -75,14 +76,16 @@ def test_an_unknown_covariance_is_none(ear: Ear, covariance: int) -> None:
 def test_a_limit_is_no_distance(ear: Ear, current: int) -> None:
     """Out of range is reported as the limit, not left out."""
     assert ear.hear(distance(current)) == []
-    assert ear.refused == {"DISTANCE_SENSOR.out_of_range": 1}
+    assert ear.passed_over == {"DISTANCE_SENSOR.out_of_range": 1}
+    assert ear.refused == {}
 
 
 def test_a_sensor_without_limits_is_used(ear: Ear) -> None:
     assert len(ear.hear(distance(9_000, low=0, high=0))) == 1
 
 
-def test_an_invalid_signal_is_refused(ear: Ear) -> None:
+def test_an_invalid_signal_is_passed_over(ear: Ear) -> None:
     assert ear.hear(distance(150, quality=1)) == []
     assert len(ear.hear(distance(150, quality=100))) == 1
-    assert ear.refused == {"DISTANCE_SENSOR.signal_quality": 1}
+    assert ear.passed_over == {"DISTANCE_SENSOR.signal_quality": 1}
+    assert ear.refused == {}

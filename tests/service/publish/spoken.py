@@ -108,9 +108,22 @@ def sensors() -> Sensors:
         ],
         links=[
             LinkStatus(
-                "autopilot", "up", "", 900, 500, {"bad_checksum": 1}, 40, 0, "timesync", 0.2, 0.001, 0.1
+                "autopilot",
+                "up",
+                "",
+                900,
+                500,
+                {"bad_checksum": 1},
+                {"GPS_RAW_INT.fix_type": 77},
+                40,
+                0,
+                3,
+                "timesync",
+                0.2,
+                0.001,
+                0.1,
             ),
-            LinkStatus("bus", "retrying", "no such device", 0, 0, {}, 0, 0, "", None, None, None),
+            LinkStatus("bus", "retrying", "no such device", 0, 0, {}, {}, 0, 0, 0, "", None, None, None),
         ],
     )
 

@@ -77,6 +77,20 @@ def test_everything_is_on_the_smallest_screen(known: Known) -> None:
     assert "⠀" in screen
 
 
+def test_what_is_empty_or_lost_is_not_bad(known: Known) -> None:
+    """Fixes without a fix are an outage's normal traffic: beside what is bad, where there is room for it."""
+    lines = printed(known, 100, 30)
+    heading = next(line for line in lines if "empty" in line)
+    row = next(line for line in lines if "autopilot" in line and " up " in line)
+    cells = [
+        row[heading.index(name) + len(name) - 4 : heading.index(name) + len(name)].strip()
+        for name in ("bad", "empty", "lost")
+    ]
+    assert cells == ["1", "77", "3"]
+    (narrow,) = (line for line in printed(known) if "autopilot" in line and " up " in line)
+    assert narrow.split()[-2] == "1"
+
+
 def test_what_is_unknown_is_a_dash_and_nothing_more() -> None:
     known = Known("mower")
     unknown = estimate(

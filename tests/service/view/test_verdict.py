@@ -32,7 +32,7 @@ def configuration() -> Configuration:
 
 def told(samples: dict[str, int]) -> Sensors:
     links = [
-        LinkStatus(name, "up", "", count, count, {}, 0, 0, "", None, None, None)
+        LinkStatus(name, "up", "", count, count, {}, {}, 0, 0, 0, "", None, None, None)
         for name, count in samples.items()
     ]
     used = [
