@@ -135,8 +135,6 @@ class Estimates:
     def __init__(self, vehicle: str) -> None:
         self.arrived: deque[tuple[float, dict[str, Any]]] = deque(maxlen=2000)
         self.states: deque[dict[str, Any]] = deque(maxlen=50)
-        self.heard = 0.0
-        """When the last word on the sensors arrived, monotonic seconds."""
         self._session = until(self._opened, "a Zenoh session with the daemon")
         key = f"beliefd/v1/{vehicle}/"
         self._subscribers = [
@@ -161,7 +159,6 @@ class Estimates:
 
     def _note(self, sample: zenoh.Sample) -> None:
         self.states.append(json.loads(sample.payload.to_bytes()))
-        self.heard = time.monotonic()
 
     def newest(self) -> dict[str, Any] | None:
         """Return the last estimate that has arrived."""
@@ -191,12 +188,10 @@ class Estimates:
         links = self.states[-1]["links"] if self.states else []
         return next((link for link in links if link["name"] == name), {})
 
-    def carries(self, name: str, since: float) -> bool:
-        """Tell whether a link has brought messages by a report of after ``since`` (monotonic seconds)."""
+    def carries_anew(self, name: str, before: int) -> bool:
+        """Tell whether a link is up and counts its messages from the start again: another process reports."""
         link = self.link(name)
-        age = link.get("age")
-        fresh = bool(self.states) and age is not None and self.heard - age > since
-        return fresh and link["state"] == "up" and link["messages"] > 0
+        return link.get("state") == "up" and 0 < link["messages"] < before
 
     def close(self) -> None:
         """End the session."""

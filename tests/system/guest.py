@@ -205,14 +205,26 @@ def estimating(tally: Tally, estimates: Estimates) -> Vehicle:
 def killing(tally: Tally, vehicle: Vehicle) -> None:
     for name in ("link bus", "link autopilot", "loop", "publisher"):
         with tally.check(f"kill -9 of the {name} is survived") as facts, watching() as estimates:
-            before, restarts, since = processes(), unit("NRestarts"), time.monotonic()
-            os.kill(before[name], signal.SIGKILL)
-            replaced(name, before)
-            facts.append(f"new process after {time.monotonic() - since:.1f} s")
-            facts.append(recovered(name, estimates, vehicle, since))
-            expect(unit("NRestarts") == restarts, "systemd restarted the service")
-            others = {role: pid for role, pid in before.items() if role != name}
-            expect(others.items() <= processes().items(), (before, processes()))
+            facts.extend(killed(name, estimates, vehicle))
+
+
+def killed(name: str, estimates: Estimates, vehicle: Vehicle) -> list[str]:
+    """Kill a process and wait until the chain is whole again, with everything else undisturbed."""
+    link = name.removeprefix("link ")
+    until(lambda: estimates.states, "a word on the links")
+    messages = estimates.link(link).get("messages", 0)
+    before, restarts, since = processes(), unit("NRestarts"), time.monotonic()
+    os.kill(before[name], signal.SIGKILL)
+    replaced(name, before)
+    facts = [f"new process after {time.monotonic() - since:.1f} s"]
+    if link != name:
+        until(lambda: estimates.carries_anew(link, messages), f"messages by the new {name}")
+        facts.append(f"messages again after {time.monotonic() - since:.1f} s")
+    facts.append(recovered(name, estimates, vehicle, since))
+    expect(unit("NRestarts") == restarts, "systemd restarted the service")
+    others = {role: pid for role, pid in before.items() if role != name}
+    expect(others.items() <= processes().items(), (before, processes()))
+    return facts
 
 
 def recovered(name: str, estimates: Estimates, vehicle: Vehicle, since: float) -> str:
@@ -223,12 +235,8 @@ def recovered(name: str, estimates: Estimates, vehicle: Vehicle, since: float) -
         return f"estimates again after {time.monotonic() - since:.1f} s"
     if name == "loop":
         return located_again(estimates, vehicle, since)
-    until(lambda: estimates.carries(name.removeprefix("link "), since), f"messages by the new {name}")
-    carried = time.monotonic() - since
     until(lambda: estimates.located_after(time.monotonic() - 0.5), "a position")
-    return (
-        f"messages again after {carried:.1f} s, longest time without an estimate {estimates.gap(since):.2f} s"
-    )
+    return f"longest time without an estimate {estimates.gap(since):.2f} s"
 
 
 def located_again(estimates: Estimates, vehicle: Vehicle, since: float) -> str:
