@@ -15,6 +15,7 @@ from pathlib import Path
 from drivers.mavlink.decode import Decoder
 from drivers.mavlink.dialect import LAYOUTS
 from drivers.mavlink.frames import MARKERS, Fault, Frame, frame_at
+from drivers.mavlink.sequence import Sequences
 from drivers.mavlink.settings import MavlinkSettings
 from drivers.sample import LinkReport, Sample
 
@@ -86,6 +87,7 @@ class TlogReader:
 
     def _begin(self) -> None:
         self._decoder = Decoder(self._link, self._settings)
+        self._sequences = Sequences()
         self._clock: ReceiveClock | None = None
         self._faults: Counter[str] = Counter()
         self._kinds: Counter[int] = Counter()
@@ -126,10 +128,18 @@ class TlogReader:
             received = self._received(data, at, frame)
             at = self._position = at + STAMP + len(frame.raw)
             kinds[frame.identifier] += 1
+            self._number(frame, received)
             if frame.identifier in wanted:
                 yield from decoder.decode(frame.message(), received)
             elif frame.layout is None:
                 self._faults[Fault.UNKNOWN] += 1
+
+    def _number(self, frame: Frame, received: int) -> None:
+        """Look for a gap before this frame, if it is one of the vehicle's."""
+        if frame.layout is None:
+            self._sequences.passed(frame)
+        elif self._decoder.is_of_vehicle(frame.system, frame.component):
+            self._sequences.heard(frame, received)
 
     def _received(self, data: mmap.mmap, at: int, frame: Frame) -> int:
         """Return when the frame of the entry at ``at`` arrived, nanoseconds."""
@@ -167,6 +177,7 @@ class TlogReader:
             malformed=dict(self._faults + stamps + decoder.malformed),
             unusable=dict(decoder.unusable),
             ignored=unwanted + decoder.ignored.total(),
+            lost=self._sequences.lost,
             opened=1,
             clock=clocks.boot.method if clocks else "",
             offset=clocks.boot.offset if clocks else None,

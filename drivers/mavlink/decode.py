@@ -154,19 +154,23 @@ class Decoder:
             return self._clocks.get(self._autopilot_at)
         return next(iter(self._clocks.values()), None)
 
+    def is_of_vehicle(self, system: int, component: int) -> bool:
+        """Whether this sender is of the vehicle, as far as its address tells."""
+        components = self._settings.components
+        if components is None:
+            if component in GIMBALS or component in CAMERAS:
+                return False
+        elif component not in components:
+            return False
+        return self.vehicle is None or system == self.vehicle
+
     def _believed(self, message: Message) -> bool:
         """Whether the message is from the vehicle.
 
         Where no system is named, the first autopilot that is heard says who that is; until then every system
         is believed, so that a log without heartbeats can be read.
         """
-        components = self._settings.components
-        if components is None:
-            if message.component in GIMBALS or message.component in CAMERAS:
-                return False
-        elif message.component not in components:
-            return False
-        if self.vehicle is not None and message.system != self.vehicle:
+        if not self.is_of_vehicle(message.system, message.component):
             return False
         if message.name != "HEARTBEAT":
             return True

@@ -54,6 +54,11 @@ class Frame(NamedTuple):
         """Whether a signature follows the checksum (unchecked here)."""
         return self.raw[0] == MARKER_2 and bool(self.raw[2] & SIGNED)
 
+    @property
+    def sequence(self) -> int:
+        """The number that its sender gave it, 0 to 255."""
+        return self.raw[4] if self.raw[0] == MARKER_2 else self.raw[2]
+
     def message(self) -> Message:
         """Decode the payload.
 
@@ -128,8 +133,10 @@ class FrameScanner:
         self._buffer = b""
         self._lost = False
 
-    def feed(self, data: bytes, take: Callable[[Frame], None]) -> None:
-        """Take in bytes and hand each whole frame to ``take``, in order."""
+    def feed(
+        self, data: bytes, take: Callable[[Frame], None], take_unknown: Callable[[Frame], None] | None = None
+    ) -> None:
+        """Take in bytes and hand each whole frame to ``take``, those of unknown messages to the other."""
         data = self._buffer + data if self._buffer else data
         at = 0
         while at < len(data):
@@ -139,6 +146,8 @@ class FrameScanner:
                 at += len(frame.raw)
                 if frame.layout is None:
                     self.faults[Fault.UNKNOWN] += 1
+                    if take_unknown is not None:
+                        take_unknown(frame)
                 else:
                     take(frame)
             elif frame is Fault.INCOMPLETE:

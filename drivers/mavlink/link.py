@@ -13,6 +13,7 @@ from drivers.mavlink.dialect import IDENTIFIERS, Message
 from drivers.mavlink.frames import Frame, FrameScanner
 from drivers.mavlink.port import Port
 from drivers.mavlink.requests import SET_MESSAGE_INTERVAL, MessageRequests
+from drivers.mavlink.sequence import Sequences
 from drivers.mavlink.settings import MavlinkSettings
 from drivers.mavlink.signing import SignatureCheck, read_key
 from drivers.mavlink.speaker import Speaker
@@ -51,6 +52,7 @@ class MavlinkLink:
         self._decoder = Decoder(name, settings)
         self._handled = self._decoder.wanted | {TIMESYNC, COMMAND_ACK}
         self._scanner = FrameScanner()
+        self._sequences = Sequences()
         self._timesync = TimeSynchroniser()
         self._port: Port | None = None
         self._speaker: Speaker | None = None
@@ -84,6 +86,7 @@ class MavlinkLink:
         self._port = open_port(self._settings.url)
         self._speaker = Speaker(self._decoder.vehicle or UNKNOWN_VEHICLE, self._settings.own_component, key)
         self._scanner.forget()
+        self._sequences.forget()
         self._requests.restart()
         self._opened += 1
         self._heard = self._heartbeat_due = self._duty_due = 0
@@ -112,7 +115,7 @@ class MavlinkLink:
         self._samples = []
         self._received = time.monotonic_ns()
         for piece in port.read():
-            self._scanner.feed(piece, self._take)
+            self._scanner.feed(piece, self._take, self._sequences.passed)
         return self._samples
 
     def report(self) -> LinkReport:
@@ -129,6 +132,7 @@ class MavlinkLink:
             malformed=dict(self._scanner.faults + self._refused + decoder.malformed),
             unusable=dict(decoder.unusable),
             ignored=self._ignored + decoder.ignored.total(),
+            lost=self._sequences.lost,
             opened=self._opened,
             clock=clocks.boot.method if clocks else "",
             offset=clocks.boot.offset if clocks else None,
@@ -155,6 +159,8 @@ class MavlinkLink:
             self._refused[fault] += 1
             return
         self._heard = self._received
+        if self._decoder.is_of_vehicle(frame.system, frame.component):
+            self._sequences.heard(frame, self._received)
         if frame.identifier not in self._handled:
             self._ignored += 1
             return

@@ -27,7 +27,7 @@ def entry(data: bytes, after_us: int) -> bytes:
 
 def ordinary(count: int) -> list[bytes]:
     """A heartbeat, then attitudes at 50 Hz that arrive when they were measured, 10 s after boot."""
-    attitudes = [entry(attitude(10_000 + 20 * i), 20_000 * i) for i in range(count)]
+    attitudes = [entry(attitude(10_000 + 20 * i, sequence=(i + 1) % 256), 20_000 * i) for i in range(count)]
     return [entry(heartbeat(), 0), *attitudes]
 
 
@@ -53,6 +53,7 @@ def test_samples_come_in_order_on_the_receive_clock(path: Path) -> None:
     assert all(s.time <= s.received for s in samples)
     report = reader.report()
     assert (report.messages, report.samples, report.malformed, report.ignored) == (6, 6, {}, 0)
+    assert report.lost == 0
     assert report.clock == "envelope"
     assert reader.position == reader.size == path.stat().st_size
 
@@ -79,6 +80,17 @@ def test_everything_that_was_met_is_named(path: Path) -> None:
     report = reader.report()
     assert report.ignored == 1
     assert report.malformed == {"unknown_message": 1}
+
+
+def test_what_is_missing_in_it_is_counted(path: Path) -> None:
+    """One round and a half of the numbers, less twelve; an unknown message has a number as well."""
+    whole = ordinary(400)
+    whole[100] = entry(raw_frame(0xABCDEF, 0, b"?", sequence=100), 1_980_000)
+    _, reader = read(path, *whole[:50], *whole[57:255], *whole[260:])
+    assert reader.report().lost == 12
+    assert reader.report().malformed == {"unknown_message": 1}
+    list(reader)
+    assert reader.report().lost == 12
 
 
 def test_mavlink_1_and_signed_frames_are_read(path: Path) -> None:

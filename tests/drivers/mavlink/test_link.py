@@ -209,6 +209,34 @@ def test_a_malformed_flood_is_counted_and_costs_nothing_else(link: MavlinkLink, 
     assert report.malformed["lost_bytes"] == 20 * (len(bad) + 9)
 
 
+def test_what_the_vehicle_sent_and_did_not_arrive_is_counted(link: MavlinkLink, autopilot: Autopilot) -> None:
+    """Only the vehicle's: a router passes on but some of what another says, and its gaps are no loss."""
+    autopilot.say(heartbeat())  # number 0
+    until(link, lambda: link.report().messages == 1)
+    for number in (1, 2, 6, 7):
+        autopilot.say(attitude(5_000 + 20 * number, sequence=number))
+    autopilot.say(raw_frame(0xABCDEF, 1, b"?", sequence=8))  # a message of a newer dialect was not lost
+    for number in (3, 60, 90):
+        autopilot.say(attitude(5_000 + number, system=9, sequence=number))
+    autopilot.say(frame("TIMESYNC", 0, 1, sequence=9), attitude(5_240, sequence=12))
+    until(link, lambda: link.report().messages == 6)
+    assert link.report().lost == 3 + 2
+
+
+def test_what_passed_while_it_was_closed_is_not_known(link: MavlinkLink) -> None:
+    first = autopilot_of(link)
+    first.say(heartbeat(), attitude(5_000, sequence=1))
+    until(link, lambda: link.report().messages == 2)
+    link.close()
+    link.open()
+    second = autopilot_of(link)
+    second.say(attitude(5_100, sequence=50), attitude(5_120, sequence=52))
+    until(link, lambda: link.report().messages == 4)
+    assert link.report().lost == 1
+    for peer in (first, second):
+        peer.socket.close()
+
+
 def test_its_own_messages_sent_back_are_ignored(link: MavlinkLink, autopilot: Autopilot) -> None:
     autopilot.say(
         heartbeat(), heartbeat(component=197, kind=18, autopilot=8), frame("SIM_STATE", *[0.0] * 21, 1, 1)

@@ -81,11 +81,11 @@ def raw_frame(
     return b"\xfd" + head + body + crc(head + body + bytes((extra,))).to_bytes(2, "little")
 
 
-def frame_1(name: str, *values: float, system: int = 1, component: int = 1) -> bytes:
+def frame_1(name: str, *values: float, system: int = 1, component: int = 1, sequence: int = 0) -> bytes:
     """A MAVLink 1 frame: one byte of id, no zeros cut."""
     identifier, extra, _ = LAYOUTS[name]
     body = payload(name, *values)
-    head = bytes((len(body), 0, system, component, identifier))
+    head = bytes((len(body), sequence, system, component, identifier))
     return b"\xfe" + head + body + crc(head + body + bytes((extra,))).to_bytes(2, "little")
 
 
@@ -97,8 +97,9 @@ def heartbeat(
     )
 
 
-def attitude(boot_ms: int, yaw: float = 0.5, system: int = 1, component: int = 1) -> bytes:
-    return frame("ATTITUDE", boot_ms, 0.1, -0.2, yaw, 0.01, 0.02, 0.03, system=system, component=component)
+def attitude(boot_ms: int, yaw: float = 0.5, system: int = 1, component: int = 1, sequence: int = 0) -> bytes:
+    values = (boot_ms, 0.1, -0.2, yaw, 0.01, 0.02, 0.03)
+    return frame("ATTITUDE", *values, system=system, component=component, sequence=sequence)
 
 
 def gps(
