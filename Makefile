@@ -48,7 +48,7 @@ docs: $(INSTALLED) ## the pages that are generated
 	$(BIN)/python -m service.publish.reference > docs/wire.md
 
 figures: install ## the figures of docs/filters.md, from the filters themselves
-	$(BIN)/python docs/figures.py
+	NUMBA_CACHE_DIR=$$($(BIN)/python -c 'from service import kernels; print(kernels.prepare())') $(BIN)/python docs/figures.py
 
 clean: ## remove everything that was made
 	rm -rf $(VENV) .vm build dist .pytest_cache .ruff_cache .hypothesis .coverage

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import math
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -23,14 +24,11 @@ EXAMPLE = ROOT / "docs" / "examples" / "bearing.py"
 
 
 @pytest.fixture(scope="module")
-def example() -> ModuleType:
-    specification = importlib.util.spec_from_file_location("bearing_example", EXAMPLE)
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    sys.modules["bearing_example"] = module
-    specification.loader.exec_module(module)
-    return module
+def example() -> Iterator[ModuleType]:
+    """Import it by a name that the script could import too: numba's cache of its kernel remembers the name."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(EXAMPLE.parent)
+        yield importlib.import_module("bearing")
 
 
 def some_particles(count: int) -> ParticleSet:
