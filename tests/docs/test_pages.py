@@ -18,7 +18,7 @@ from service.publish.reference import VALUES
 from service.timeline import CAPACITY, Timeline
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 OPERATING = (ROOT / "docs" / "operating.md").read_text(encoding="utf-8")
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 
@@ -139,6 +139,14 @@ def test_every_option_named_exists() -> None:
     for page in PAGES:
         for option in set(re.findall(r"(?<![\w-])--[a-z]+(?:-[a-z]+)*", page.read_text(encoding="utf-8"))):
             assert option in helps, f"{page.name}: {option}"
+
+
+def test_every_target_named_exists() -> None:
+    targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        named = set(re.findall(r"`make (\w+)`", text)) | set(re.findall(r"^make (\w+) ", text, re.MULTILINE))
+        assert named <= targets, page.name
 
 
 def test_the_table_of_states_is_the_code() -> None:
