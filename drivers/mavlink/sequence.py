@@ -37,7 +37,6 @@ class _Sender:
             self.missing.remove(sequence)
             return -1
         if sequence == 0 and NEAR <= gap <= NUMBERS - NEAR:
-            self.missing.clear()
             self.due = 1
             return 0
         if gap > LARGEST_GAP:  # it came twice

@@ -77,6 +77,10 @@ def test_what_came_twice_after_it_was_lost_counts_once() -> None:
     assert Ear().hear((5, 9, 7, 7, 10)) == 2
 
 
+def test_a_loss_of_an_earlier_round_is_not_made_good_by_a_later_one() -> None:
+    assert Ear().hear((4, *range(6, 256 + 6), 5)) == 1
+
+
 @pytest.mark.parametrize("last", [30, 100, 127, 128, 129, 200, 230])
 def test_a_boot_is_not_a_loss(last: int) -> None:
     ear = Ear()
