@@ -21,6 +21,7 @@ from drivers.link import LinkError
 from drivers.sample import LinkReport, Sample
 
 MULTICAST = "mcast"
+SERIAL = "slcan"
 
 _MOST_PER_POLL = 512
 _MOST_DAMAGED = 1_000
@@ -125,6 +126,10 @@ class CanLink:
         if settings.interface == MULTICAST:
             return MulticastBus(settings.channel)
         arguments: dict[str, Any] = dict(settings.options)
+        if settings.interface == SERIAL:
+            # python-can sleeps 2 s here for adapters that restart when they are opened. Most do not, and all the
+            # while nothing is read: after every reconnection the vehicle would go unheard for that long.
+            arguments.setdefault("sleep_after_open", 0.0)
         if settings.bitrate is not None:
             arguments["bitrate"] = settings.bitrate
         if settings.interface in _FILTERING:

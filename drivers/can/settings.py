@@ -23,7 +23,7 @@ class CanSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     protocol : str
         ``dronecan``.
     options : dict
-        Further arguments of the python-can interface, e.g. ``{sleep_after_open = 0.0}`` for ``slcan``.
+        Further arguments of the python-can interface, e.g. ``{rtscts = true}`` for ``slcan``.
     range_orientation : int
         Where a range finder looks (MAV_SENSOR_ORIENTATION, 25: down) when its message leaves that undefined.
     """

@@ -8,9 +8,12 @@ import time
 import tty
 import uuid
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 
 import can
+import msgspec
 import pytest
+from can.interfaces import slcan
 
 from drivers.can import CanFrame, CanLink, CanSettings
 from drivers.link import Link, LinkError
@@ -193,9 +196,7 @@ class Adapter:
             os.close(end)
 
     def settings(self) -> CanSettings:
-        return CanSettings(
-            interface="slcan", channel=self.device, bitrate=1_000_000, options={"sleep_after_open": 0.0}
-        )
+        return CanSettings(interface="slcan", channel=self.device, bitrate=1_000_000)
 
 
 @pytest.fixture
@@ -219,6 +220,20 @@ def test_a_serial_adapter(adapter: Adapter) -> None:
         link.close()
     adapter.listen()
     assert adapter.heard.endswith(b"C\r")
+
+
+@pytest.mark.parametrize(
+    ("options", "slept"), [({}, [0.0]), ({"sleep_after_open": 0.25}, [0.25])], ids=["default", "configured"]
+)
+def test_a_serial_adapter_is_waited_for_only_where_the_options_say_so(
+    adapter: Adapter, monkeypatch: pytest.MonkeyPatch, options: dict[str, float], slept: list[float]
+) -> None:
+    sleeps: list[float] = []
+    monkeypatch.setattr(slcan, "time", SimpleNamespace(**{**vars(time), "sleep": sleeps.append}))
+    link = CanLink("bus", msgspec.structs.replace(adapter.settings(), options=options))
+    link.open()
+    link.close()
+    assert sleeps == slept
 
 
 def test_noise_on_the_serial_line_is_counted(adapter: Adapter) -> None:
