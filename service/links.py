@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from drivers.can import CanSettings
     from drivers.mavlink import MavlinkSettings
 
+HUD_RATE = 10.0  # Hz: what is wanted of VFR_HUD has to be asked for, like the rest
+
 
 def link_named(configuration: Configuration, name: str) -> Link:
     """Return the link that the configuration calls ``name``, not yet open.
@@ -50,11 +52,13 @@ def mavlink_settings(link: MavlinkLink) -> MavlinkSettings:
         url=link.url,
         system=link.system,
         components=frozenset(link.components) or None,
-        rates=DEFAULT_RATES | link.rates,
+        rates=DEFAULT_RATES | ({"VFR_HUD": HUD_RATE} if link.hud else {}) | link.rates,
         servos=tuple(
             ServoCalibration(servo.channel, servo.low, servo.trim, servo.high, servo.reversed)
             for servo in link.servo
         ),
+        hud=frozenset(link.hud),
+        geoid_height=link.geoid_height,
         signing_key_file=link.signing_key_file,
     )
 
@@ -75,6 +79,7 @@ def can_settings(link: CanLink) -> CanSettings:
         bitrate=link.bitrate,
         protocol=link.protocol,
         options=link.options,
+        range_orientation=link.range_orientation,
     )
 
 

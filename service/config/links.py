@@ -71,6 +71,14 @@ class MavlinkLink(Section):
     """Messages to ask for beside the usual ones and how often, Hz: { RAW_IMU = 50 }; 0 asks for none."""
     servo: tuple[ServoCalibration, ...] = ()
     """Calibration of SERVO_OUTPUT_RAW, one [[link.servo]] for each output that moves the vehicle."""
+    hud: tuple[Literal["groundspeed", "altitude", "heading"], ...] = ()
+    """What to take from VFR_HUD, where the vehicle sends nothing better.
+
+    It repeats GNSS and the autopilot's own filter: used beside those it counts twice."""
+    geoid_height: Annotated[Number, Field(ge=-120, le=120)] | None = None
+    """Mean sea level above the WGS 84 ellipsoid at the site, m.
+
+    RANGING_BEACON may give a beacon's altitude above the ellipsoid; without this it stays unknown."""
 
 
 class Signal(Section):
@@ -106,7 +114,12 @@ class CanLink(Section):
     bitrate: Annotated[Whole, Field(ge=10_000, le=8_000_000)] | None = None
     """Bit/s, for interfaces that set it themselves (slcan, pcan); SocketCAN's is set by ip link."""
     options: dict[str, Option] = Field(default_factory=dict)
-    """Further arguments for python-can's interface."""
+    """Further arguments for python-can's interface.
+
+    For slcan sleep_after_open is 0 here; an adapter that restarts when it is opened needs
+    { sleep_after_open = 2.0 }."""
+    range_orientation: Annotated[Whole, Field(ge=0, le=101)] = 25
+    """Where a range finder looks that does not say it itself, MAV_SENSOR_ORIENTATION: 25 down, 0 forward."""
     signal: tuple[Signal, ...] = ()
     """Which signal is what, one [[link.signal]] each, for protocol = "dbc"."""
 

@@ -107,6 +107,13 @@ SINGLE = [
         [{"channel": 1, "low": 1600}],
         "servo 1: needs low <= trim <= high, got 1600, 1500, 1900",
     ),
+    (
+        "link.0.hud",
+        ["airspeed"],
+        'hud, number 1: needs one of groundspeed, altitude, heading, got "airspeed"',
+    ),
+    ("link.0.geoid_height", 300, 'link "autopilot" (link 1), geoid_height: needs at most 120, got 300'),
+    ("link.1.range_orientation", 200, 'link "bus" (link 2), range_orientation: needs at most 101, got 200'),
     ("link.0.system", 256, 'link "autopilot" (link 1), system: needs at most 255, got 256'),
     ("link.0.signing_key_file", "/no/key", "signing_key_file: needs a file that exists, there is no /no/key"),
     (
