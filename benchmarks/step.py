@@ -21,9 +21,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from filters.motion import Unicycle, UnicycleControl
-from filters.particle import ParticleFilter
-from filters.sensing import Range, RangeMeasurement
+from service import kernels
+
+kernels.prepare()  # numba's own cache would not notice a change in a function that was inlined
+
+from filters.motion import Unicycle, UnicycleControl  # noqa: E402
+from filters.particle import ParticleFilter  # noqa: E402
+from filters.sensing import Range, RangeMeasurement  # noqa: E402
 
 DURATION = 0.02
 SPEED, RADIUS = 3.0, 8.5

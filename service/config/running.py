@@ -65,4 +65,4 @@ class State(Section):
     """What survives a restart."""
 
     directory: Annotated[str, Field(min_length=1)] = "/var/lib/beliefd"
-    """Where the checkpoint for warm starts is kept."""
+    """Folder for what survives a restart. This version keeps nothing in it: a restart is a new start."""

@@ -298,7 +298,7 @@ def test_what_is_not_finite_never_touches_the_weights(value: float) -> None:
 
 def test_a_refused_measurement_is_not_accepted() -> None:
     belief = started(100)
-    evidence = belief.weigh(Range(0.5, span=10.0), RangeMeasurement(11.0, 1.0, 1.0))
+    evidence = belief.weigh(Range(0.5, longest=10.0), RangeMeasurement(11.0, 1.0, 1.0))
     assert not evidence.accepted
     assert math.isnan(evidence.log_mean)
     assert (belief.weights == 1.0).all()
