@@ -165,14 +165,15 @@ class ClockMap:
         Returns
         -------
         int
-            Nanoseconds on the host's clock, never later than ``received``.
+            Nanoseconds on the host's clock, never later than ``received``, nor below 0: beside a stamp from
+            the far future a true one would lie further back than a sample's time can say.
         """
         if stamp == 0:
             return received
         sensor, on_line = self._place(stamp * kind.unit, kind, received)
         if on_line:
             self._arrived(sensor, received)
-        return received if self._offset is None else min(received, sensor + self._offset)
+        return received if self._offset is None else min(received, max(0, sensor + self._offset))
 
     def exchanged(self, sent: int, peer: int, received: int) -> None:
         """Take in one answered TIMESYNC: the peer read ``peer`` between ``sent`` and ``received`` (ns)."""

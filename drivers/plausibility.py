@@ -50,13 +50,17 @@ _LIMITS: dict[str, tuple[float, float]] = {
     "index": (0, 255),
     "angular_speed": (-1e5, 1e5),
     "channels": (-1.0, 1.0),
+    "epoch": (0, 2**63 - 1),
+    "type": (0, 255),
+    "autopilot": (0, 255),
+    "system_status": (0, 255),
 }
 _DISTANCES: dict[str, tuple[float, float]] = {
     "range": (0.0, 1e6),
     "clearance": (0.0, 1e6),
     "odometer": (-1e9, 1e9),
 }
-_ANYTHING = (-math.inf, math.inf)
+_ANYTHING = (-1e18, 1e18)  # an integer of JSON may be larger than any number that goes on to the loop
 _LONGEST = 256
 
 _Wrong = Callable[[object], bool]

@@ -170,6 +170,19 @@ def test_one_wild_stamp_harms_nothing() -> None:
             assert abs(time - true) < 5 * MILLI
 
 
+@pytest.mark.parametrize("nonsense", [2**64 - 1, 2**63])
+def test_a_first_stamp_from_the_far_future_makes_no_time_that_no_datagram_can_carry(nonsense: int) -> None:
+    """The true stamps after it lie before the clock's zero, until three of them have made the true line."""
+    clock = ClockMap()
+    now = 1000 * SECOND
+    times = [clock.host_time(nonsense, BOOT_US, now)]
+    for step in range(1, 40):
+        arrival = now + step * SECOND // 10
+        times.append(clock.host_time(500_000_000 + step * 100_000, BOOT_US, arrival))
+    assert min(times) >= 0
+    assert times[-1] == arrival
+
+
 def test_a_backlog_is_old_and_not_a_new_clock() -> None:
     """Ten seconds held back and then delivered at once: the stamps say when it was, the arrival does not."""
     mapped = ClockMap()

@@ -62,12 +62,30 @@ def test_what_is_refused_and_why(payload: bytes, kind: str) -> None:
     assert str(refusal.value) == kind
 
 
+@pytest.mark.parametrize("digits", [20, 400])
+@pytest.mark.parametrize(
+    ("text", "field"),
+    [
+        ('{"kind": "odometer", "distance": [1.0], "epoch": %s}', "epoch"),
+        (
+            '{"kind": "presence", "type": 10, "autopilot": 3, "armed": true, "system_status": %s}',
+            "system_status",
+        ),
+        ('{"kind": "range", "beacon": %s, "distance": 1.0}', "beacon"),
+    ],
+)
+def test_an_integer_that_no_datagram_can_carry_is_refused(text: str, field: str, digits: int) -> None:
+    with pytest.raises(MalformedSample) as refusal:
+        decode((text % ("1" * digits)).encode())
+    assert str(refusal.value) == field
+
+
 def test_a_number_too_large_for_a_float() -> None:
     with pytest.raises(MalformedSample):
         decode(b'{"kind": "speed", "speed": 1e999}')
 
 
-NUMBERS = st.floats(-1e7, 1e7) | st.integers(-1000, 1000) | st.none()
+NUMBERS = st.floats(-1e7, 1e7) | st.integers(-1000, 1000) | st.integers(-(2**70), 2**70) | st.none()
 VALUES = NUMBERS | st.lists(NUMBERS, max_size=4) | st.booleans() | st.text(max_size=3)
 FIELDS = sorted({name for kind in KINDS for name in kind.__struct_fields__} | {"time", "x"})
 TAGS = sorted(str(kind.__struct_config__.tag) for kind in KINDS)

@@ -61,6 +61,8 @@ def test_what_can_be_true(reading: AnyReading) -> None:
         (Odometer(distance=(0.0,) * 257), "distance"),
         (Pressure(absolute=0.0), "absolute"),
         (ActuatorCommand((0.0, 1.1)), "channels"),
+        (Odometer(distance=(0.0,), epoch=2**63), "epoch"),
+        (Presence(type=256, autopilot=3, armed=True, system_status=4), "type"),
     ],
 )
 def test_what_cannot(reading: AnyReading, field: str) -> None:
