@@ -179,8 +179,7 @@ class Publisher:
             self._put(change)
 
     def _retry_later(self, reason: str) -> None:
-        now = time.monotonic()
-        self._upkeep_at = now + self._back_off.failed(now - self._opened_at)
+        self._upkeep_at = time.monotonic() + self._back_off.failed(0.0)
         if reason != self._complaint:
             log.error("no Zenoh session: %s; trying again", reason)
             self._complaint = reason

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import socket
 import time
 from collections.abc import Callable
+from itertools import pairwise
 
 import jsonschema
 import msgspec
@@ -13,11 +15,14 @@ import pytest
 import zenoh
 
 from service.estimate import HealthState, Status
+from service.publish.session import Opened, SessionError
 from service.publish.topics import QUERIES, TOPICS
+from service.publish.zenoh import Publisher
 from tests.service.publish.conftest import Daemon
 from tests.service.publish.spoken import (
     budget,
     cloud,
+    configured,
     estimate,
     health,
     processes,
@@ -53,6 +58,23 @@ def answered(session: zenoh.Session, key: str) -> bytes:
 def status(session: zenoh.Session) -> Status:
     """Return what the daemon says of itself."""
     return msgspec.json.decode(answered(session, "@rpc/status"), type=Status)
+
+
+def test_a_session_that_cannot_be_had_is_tried_ever_more_rarely() -> None:
+    """The waits between five attempts double from 0.1 s, however long the machine has been up."""
+    attempts: list[float] = []
+
+    def refuse() -> Opened:
+        attempts.append(time.monotonic())
+        raise SessionError("the port is taken")
+
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    with ours, theirs:
+        publisher = Publisher(configured(), theirs, refuse)
+        while len(attempts) < 5:
+            publisher.step()
+    waits = [later - earlier for earlier, later in pairwise(attempts)]
+    assert all(wait >= 0.1 * 2**index for index, wait in enumerate(waits)), waits
 
 
 def test_every_key_arrives_as_it_is_declared(start: Start, client: Client, endpoint: str) -> None:
