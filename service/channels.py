@@ -72,13 +72,13 @@ class Outlet:
     def __init__(self, end: socket.socket) -> None:
         self._socket = end
         self.dropped = 0
-        """Datagrams that the queue had no room for."""
+        """Datagrams that the kernel did not take."""
 
     def send(self, datagram: bytes | bytearray) -> bool:
-        """Send one datagram; False, and counted, when there is no room or nobody to read."""
+        """Send one datagram; False, and counted, when it is not taken: no room, nobody to read, too large."""
         try:
             self._socket.send(datagram)
-        except (BlockingIOError, ConnectionRefusedError, ConnectionResetError, BrokenPipeError):
+        except OSError:
             self.dropped += 1
             return False
         return True

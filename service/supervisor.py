@@ -94,6 +94,8 @@ class Supervisor:
         self._status_due = 0.0
         self._read = time.monotonic()
         self._unread = False
+        self._patient_until = 0.0
+        """Until then a publisher that leaves its queue full may be one that has not started reading."""
 
     def run(self) -> int:
         """Supervise until told to stop; return the exit status: 0, or 1 when the loop cannot be started."""
@@ -113,17 +115,17 @@ class Supervisor:
         reader, writer = socket.socketpair()
         reader.setblocking(False)
         writer.setblocking(False)
+        before = signal.set_wakeup_fd(writer.fileno())  # first: a signal that comes from now on is not lost
         handlers = {
             number: signal.signal(number, _noted) for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
         }
-        before = signal.set_wakeup_fd(writer.fileno())
         self._selector.register(reader, selectors.EVENT_READ)
         try:
             yield
         finally:
-            signal.set_wakeup_fd(before)
             for number, handler in handlers.items():
                 signal.signal(number, handler)
+            signal.set_wakeup_fd(before)
             self._selector.close()
             reader.close()
             writer.close()
@@ -152,7 +154,8 @@ class Supervisor:
         assert isinstance(signals, socket.socket)
         for number in signals.recv(64):
             if number == signal.SIGHUP:
-                self._reload()
+                if not self._stopping:
+                    self._reload()
             else:
                 _log.info("%s: stopping", signal.Signals(number).name)
                 self._stopping = True
@@ -163,9 +166,10 @@ class Supervisor:
         """Bring the children into line with the plan: start the new, end the old, renew the changed."""
         now = time.monotonic()
         programs = {program.name: program for program in self._plan.programs()}
-        for name, child in self._children.items():
-            if name not in programs:
-                child.end(now, None)
+        for name in set(self._children) - set(programs):
+            self._children[name].end(now, None)
+            if not self._children[name].alive:
+                del self._children[name]
         for name, program in programs.items():
             child = self._children.get(name)
             if child is None:
@@ -197,7 +201,7 @@ class Supervisor:
         except OSError as error:
             child.could_not_start(now, f"cannot be started: {error}")
             _log.error("%s: cannot be started: %s", name, error)
-            self._give_up_on(child)
+            self._stand_by(child, now)
             return
         self._selector.register(descriptor, selectors.EVENT_READ, child)
         if child.program.heart is not None:
@@ -205,8 +209,8 @@ class Supervisor:
         if child.program.vital and self._notifier.watchdog_period:
             self._notifier.watchdog_within(child.program.start_patience)
         if name == self._plan.publisher:
-            # it finds the queue as full as the last one left it, and reads only once it has started
-            self._read = now + (child.program.start_patience if self._unread else 0.0)
+            # the queue may be full already, or fill, before it has started and reads
+            self._patient_until = now + child.program.start_patience
             self._plan.call()
 
     def _listen(self, child: Child) -> None:
@@ -246,11 +250,15 @@ class Supervisor:
             del self._children[name]
         elif not expected:
             _log.warning("%s: %s; starting again in %.1f s", name, how, child.due - now)
-            self._give_up_on(child)
+            self._stand_by(child, now)
 
-    def _give_up_on(self, child: Child) -> None:
-        """Stop everything when it is the vital one that failed to start once too often."""
-        if child.program.vital and child.failed_starts >= START_LIMIT:
+    def _stand_by(self, child: Child, now: float) -> None:
+        """While the vital one waits to be started: keep systemd waiting, too, or give up after many failures."""
+        if not child.program.vital:
+            return
+        if self._notifier.watchdog_period:  # the back-off may be longer than it
+            self._notifier.watchdog_within(child.due - now + self._notifier.watchdog_period)
+        if child.failed_starts >= START_LIMIT:
             name = child.program.name
             _log.error("%s: %d starts in a row failed (%s): giving up", name, START_LIMIT, child.reason)
             self._exit_status = 1
@@ -267,7 +275,8 @@ class Supervisor:
             for line in str(error).splitlines():
                 _log.error("SIGHUP: %s", line)
             _log.error("SIGHUP: kept the old configuration")
-            self._notifier.ready()
+            if self._ready:
+                self._notifier.ready()
         else:
             self._kept = ""
             _log.info("SIGHUP: took the new configuration")
@@ -290,10 +299,13 @@ class Supervisor:
                 self._said = words
                 self._notifier.status(words)
         own = ProcessStatus("supervisor", os.getpid(), "running", 0, self._kept, resident_bytes(os.getpid()))
-        self._unread = not self._plan.statuses.send(PROCESSES + msgspec.json.encode([own, *statuses]))
-        if not self._unread:
-            self._read = now
-        elif now - self._read > UNREAD:
+        if self._plan.statuses.send(PROCESSES + msgspec.json.encode([own, *statuses])):
+            if self._unread:
+                self._patient_until = now  # it has made room: it reads
+            self._read, self._unread = now, False
+            return
+        self._unread = True
+        if now > max(self._read + UNREAD, self._patient_until):
             self._publisher_hangs(now)
 
     def _publisher_hangs(self, now: float) -> None:

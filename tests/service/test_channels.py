@@ -49,6 +49,13 @@ def test_a_reader_that_has_gone_costs_nothing(queue: Pair) -> None:
     assert outlet.dropped == 1
 
 
+def test_a_datagram_larger_than_the_queue_is_refused_and_counted(queue: Pair) -> None:
+    outlet = Outlet(queue.outlet)
+    assert not outlet.send(bytes(16 * 1024 * 1024))
+    assert outlet.dropped == 1
+    assert outlet.send(b"the next one")
+
+
 def test_two_megabytes_are_granted_or_the_system_limit() -> None:
     ends = pair(2 * 1024 * 1024)
     outlet = Outlet(ends.outlet)

@@ -220,8 +220,11 @@ def test_the_watchdog_is_fed_only_while_ticks_arrive(start: Start) -> None:
     service.hear("READY=1")
     os.kill(victim, signal.SIGSTOP)
     before = service.hear("WATCHDOG_USEC=")
-    assert before[-1] == "WATCHDOG_USEC=30000000", "while a new loop starts, systemd waits as long as we do"
+    assert before[-1] == "WATCHDOG_USEC=3100000", "it waits through the back-off"
     assert before.count("WATCHDOG=1") <= 1 + 1.0 / 0.25, "none but what was on its way"
+    starting = service.hear("WATCHDOG_USEC=")
+    assert starting[-1] == "WATCHDOG_USEC=30000000", "while a new loop starts, systemd waits as long as we do"
+    assert "WATCHDOG=1" not in starting
     between = service.hear("WATCHDOG_USEC=")
     assert between[-1] == "WATCHDOG_USEC=3000000"
     assert "WATCHDOG=1" not in between
@@ -316,14 +319,72 @@ def test_sighup_with_a_bad_configuration_keeps_the_old_one_and_says_why(start: S
     service.hear("STATUS=running: publisher, loop, link bus")
 
 
+def test_a_sighup_before_the_first_tick_does_not_make_it_ready(start: Start) -> None:
+    """A wrong configuration while the loop still starts is refused, and systemd goes on waiting."""
+    service = start(PUBLISHER, LOOP | {"manner": "mute"}, LINK)
+    service.running("publisher", "link bus")
+    service.specification.write_text("[nonsense")
+    service.process.send_signal(signal.SIGHUP)
+    assert "READY=1" not in service.hear("STATUS=kept the old configuration: plan.json:")
+
+
+def test_a_sighup_while_it_stops_changes_nothing(start: Start) -> None:
+    service = start(PUBLISHER, LOOP, LINK | {"manner": "stubborn"})
+    service.running("publisher", "loop", "link bus")
+    service.process.send_signal(signal.SIGTERM)
+    service.hear("STOPPING=1")
+    service.process.send_signal(signal.SIGHUP)
+    service.process.wait(PATIENCE)
+    assert service.process.returncode == 0
+    assert "SIGHUP" not in service.log.read_text()
+
+
+def test_a_link_that_is_taken_out_while_it_waits_is_forgotten(start: Start) -> None:
+    """It has no process whose end could be awaited."""
+    service = start(PUBLISHER, LOOP, LINK | {"manner": "die"})
+    service.wait(lambda last: "link bus" in last and last["link bus"].restarts >= 4)  # 0.8 s to wait
+    service.write(PUBLISHER, LOOP)
+    service.process.send_signal(signal.SIGHUP)
+    after = service.wait(lambda last: "link bus" not in last)
+    assert set(after) == {"supervisor", "publisher", "loop"}
+
+
+def test_systemd_waits_through_the_back_off_of_the_loop(start: Start) -> None:
+    """It grows to 5 s, beyond the watchdog: that must not end the service."""
+    service = start(PUBLISHER, LOOP | {"manner": "die"}, LINK, environment={"WATCHDOG_USEC": "1000000"})
+    service.process.wait(PATIENCE)
+    heard = [message for message in service.hear("STOPPING=1") if message.startswith("WATCHDOG_USEC=")]
+    granted = [int(message.partition("=")[2]) for message in heard]
+    assert granted[::2] == [30_000_000] * 5, "while it starts"
+    waits = [0.1, 0.2, 0.4, 0.8, 1.6]
+    assert granted[1::2] == [round((1.0 + wait) * 1e6) for wait in waits], "while it waits"
+
+
 def test_a_publisher_that_does_not_read_is_started_again(start: Start) -> None:
-    """Its queue stays full: after five seconds that is a hang."""
-    service = start(PUBLISHER, LOOP, LINK)
+    """Its queue stays full: after a while that is a hang."""
+    service = start(PUBLISHER | {"start_patience": 0.1}, LOOP, LINK, environment={"UNREAD": "1"})
     victim = service.running("publisher", "loop", "link bus")["publisher"].pid
     service.fill()
     heard = service.hear("STATUS=running: loop, link bus; publisher")
-    assert "publisher waiting (hung: has not read for 5 s)" in heard[-1]
+    assert "publisher waiting (hung: has not read for 1 s)" in heard[-1]
     after = service.wait(
-        lambda last: last["publisher"].restarts == 1 and last["publisher"].state == "running"
+        lambda last: last["publisher"].restarts >= 1 and last["publisher"].state == "running"
     )
     assert after["publisher"].pid != victim
+
+
+@pytest.mark.parametrize("full", ["before it starts", "while it starts"])
+def test_a_publisher_is_given_time_to_start_before_its_queue_counts(start: Start, full: str) -> None:
+    """The loop goes on filling the queue while a new publisher starts, which may take longer than a hang."""
+    service = start(PUBLISHER | {"start_patience": 4.0}, LOOP, LINK, environment={"UNREAD": "1"})
+    victim = service.running("publisher", "loop", "link bus")["publisher"].pid
+    assert victim is not None
+    service.hear("STATUS=running: publisher, loop, link bus")
+    if full == "before it starts":
+        service.fill()
+    os.kill(victim, signal.SIGKILL)
+    killed = time.monotonic()
+    service.hear("STATUS=running: publisher, loop, link bus")
+    service.fill()
+    heard = service.hear("STATUS=running: loop, link bus; publisher waiting (hung: has not read for 1 s)")
+    assert time.monotonic() - killed > 4.0, heard

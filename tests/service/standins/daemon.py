@@ -1,6 +1,7 @@
 """The real supervisor over stand-in children: ``daemon.py <specification.json> <statuses descriptor>``.
 
-The specification is a list of objects: name, manner (see ``child.py``), and what else a Program has.
+The specification is a list of objects: name, manner (see ``child.py``), and what else a Program has. ``UNREAD``
+in the environment shortens the supervisor's patience with a publisher that does not read.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import socket
 import sys
 from pathlib import Path
 
+from service import supervisor
 from service.channels import Outlet, Pair, pair
 from service.child import Program
 from service.config import ConfigurationError
@@ -56,5 +58,6 @@ class Plan:
 
 if __name__ == "__main__":
     write_log()
+    supervisor.UNREAD = float(os.environ.get("UNREAD", supervisor.UNREAD))
     plan = Plan(Path(sys.argv[1]), socket.socket(fileno=int(sys.argv[2])))
     sys.exit(Supervisor(plan, Notifier()).run())
