@@ -74,6 +74,8 @@ def open_port(url: str) -> Port:
     except OSError as error:
         right = WHAT_IS_RIGHT.get(error.errno or 0, "check the host, the port and the network")
         raise LinkError(f"{url}: cannot be opened: {error.strerror or error}; {right}") from error
+    except ValueError as error:  # a name that is none, its labels too long
+        raise LinkError(f"{url}: cannot be opened: {error}; write a host's name or address") from error
 
 
 def _address(url: str, scheme: str, text: str) -> tuple[str, int]:

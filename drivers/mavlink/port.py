@@ -20,6 +20,9 @@ from drivers.link import LinkError
 LARGEST = 65_535
 DRAIN = 512  # datagrams a time, so that what is due is done in a flood too
 CONNECT_WITHIN = 2.0
+UNANSWERED_WITHIN = (
+    10.0  # s: a peer that lost its power says no goodbye, and TCP alone waits a quarter of an hour
+)
 RECEIVE_BUFFER = 1 << 20
 PEER_SILENT_AFTER = 10.0
 PEERS = 16
@@ -169,8 +172,7 @@ class ListeningPort(_SocketPort):
                 connection, _ = self._socket.accept()
             except OSError:  # it went before it was accepted
                 return []
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._client = StreamPort(self._url, connection)
+            self._client = StreamPort(self._url, _attended(connection))
         try:
             return self._client.read()
         except LinkError:
@@ -232,9 +234,15 @@ def udp_broadcast(url: str, address: tuple[str, int]) -> Port:
 
 def tcp_client(url: str, address: tuple[str, int]) -> Port:
     """Connect to a TCP server, within two seconds."""
-    connection = socket.create_connection(address, CONNECT_WITHIN)
+    return StreamPort(url, _attended(socket.create_connection(address, CONNECT_WITHIN)))
+
+
+def _attended(connection: socket.socket) -> socket.socket:
+    """Have what is sent leave at once, and the connection end when it is not acknowledged in time."""
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    return StreamPort(url, connection)
+    patience = round(1e3 * UNANSWERED_WITHIN)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, patience)
+    return connection
 
 
 def tcp_server(url: str, address: tuple[str, int]) -> Port:

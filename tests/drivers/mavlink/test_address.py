@@ -5,7 +5,10 @@ from __future__ import annotations
 import importlib.util
 import os
 import pty
+import shutil
 import socket
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -115,6 +118,51 @@ def test_a_closed_connection_breaks_the_link() -> None:
     client.close()
 
 
+VANISHING = """
+import subprocess, time
+from drivers.link import LinkError
+from drivers.mavlink import port
+from drivers.mavlink.address import open_port
+port.UNANSWERED_WITHIN = 1.0
+subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
+server = open_port("tcpin:127.0.0.1:0")
+client = open_port(f"tcp:127.0.0.1:{server.address[1]}")
+assert client.write(b"hello") and server.wait(5.0) and server.read() == [b"hello"]
+subprocess.run(["ip", "link", "set", "lo", "down"], check=True)
+end = time.monotonic() + 30.0
+broken = ""
+while not (broken and server._client is None):
+    assert time.monotonic() < end, "nobody noticed"
+    for side in (server, client):
+        side.write(b"heartbeat")
+        try:
+            if side.wait(0.05):
+                side.read()
+        except LinkError as error:
+            broken = str(error)
+print(broken)
+"""
+
+
+def test_a_peer_that_vanishes_without_a_goodbye_ends_the_connection() -> None:
+    """The autopilot's power is cut: no FIN, no RST. Client and server see it, and are free for the next one."""
+    namespace = ["unshare", "--map-root-user", "--net"]
+    if shutil.which("unshare") is None or shutil.which("ip") is None:
+        pytest.skip("unshare and ip are not installed")
+    if subprocess.run([*namespace, "true"], capture_output=True, check=False).returncode != 0:
+        pytest.skip("no network namespace can be made here")
+    done = subprocess.run(
+        [*namespace, sys.executable, "-c", VANISHING],
+        cwd=Path(__file__).parents[3],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "connection" in done.stdout
+
+
 def test_a_unix_socket(tmp_path: Path) -> None:
     path = str(tmp_path / "socket")
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as server:
@@ -152,6 +200,7 @@ def test_a_serial_line() -> None:
         ("udpin:192.0.2.1:14550", "not one of this machine"),
         ("tcp:127.0.0.1:1", "nobody listens there"),
         ("udpout:no.such.host.invalid:14550", "cannot be opened"),
+        (f"udpout:{'x' * 64}.local:14550", "write a host's name"),
         ("/dev/no-such-device,57600", "needs a device that exists"),
         ("/dev/null,fast", "no number"),
         ("/dev/null", "serial device /dev/null"),
