@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import errno
+import logging
+import os
+import socket
 import time
 from collections import Counter
 from typing import Any
@@ -22,6 +25,10 @@ from drivers.sample import LinkReport, Sample
 
 MULTICAST = "mcast"
 SERIAL = "slcan"
+SOCKETCAN = "socketcan"
+
+# What python-can logs it raises as well: at every attempt to open a bus that is not there the journal would grow.
+logging.getLogger("can").setLevel(logging.CRITICAL)
 
 _MOST_PER_POLL = 512
 _MOST_DAMAGED = 1_000
@@ -29,7 +36,7 @@ _SILENT_NS = 1_000_000_000
 _BUS_OFF = 0x40  # CAN_ERR_BUSOFF of linux/can/error.h, an error frame's class
 
 # Interfaces that filter before a frame reaches Python; for the others the decoder's own look is cheaper.
-_FILTERING = frozenset({"socketcan", "kvaser", "vector", "etas", "systec"})
+_FILTERING = frozenset({SOCKETCAN, "kvaser", "vector", "etas", "systec"})
 
 _REMEDIES = {
     errno.ENODEV: "no such interface; create it with ip link, or name one of those that ip link shows",
@@ -63,6 +70,14 @@ def _is_damage(error: Exception) -> bool:
     if isinstance(error, can.CanError):
         return isinstance(error.__cause__, Exception) and not isinstance(error.__cause__, OSError)
     return not isinstance(error, OSError)
+
+
+def _expect_up(bus: can.BusABC) -> None:
+    """Raise what the kernel has against a socket that it has bound: it binds to an interface that is down."""
+    with socket.socket(fileno=os.dup(bus.fileno())) as bound:
+        number = bound.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+    if number:
+        raise OSError(number, os.strerror(number))
 
 
 class CanLink:
@@ -104,12 +119,15 @@ class CanLink:
         Raises
         ------
         LinkError
-            The interface is absent or unknown, the device taken, an argument wrong.
+            The interface is absent, down or unknown, the device taken, an argument wrong.
         """
         self.close()
         try:
             self._bus = self._open_bus()
+            if self._settings.interface == SOCKETCAN:
+                _expect_up(self._bus)
         except (can.CanError, OSError, ImportError, ValueError, TypeError, RuntimeError) as error:
+            self.close()
             remedy = self._remedy(error, _OPEN_REMEDY)
             if isinstance(error, NotImplementedError):  # unknown to python-can, or its driver is missing
                 known = ", ".join(sorted({MULTICAST, *can.VALID_INTERFACES}))

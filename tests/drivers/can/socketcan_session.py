@@ -38,6 +38,7 @@ def complaint(link: CanLink, *, opening: bool) -> str:
     try:
         if opening:
             link.open()
+            return "nothing"
         for _ in range(50):
             link.poll(0.1)
     except LinkError as error:
@@ -64,8 +65,9 @@ def main() -> None:
         (waited,) = collect(link, 1)
     ip("set", CHANNEL, "down")
     down = complaint(link, opening=False)
-    ip("set", CHANNEL, "up")
     again = CanLink("bus", CanSettings(channel=CHANNEL))
+    still_down = complaint(again, opening=True)
+    ip("set", CHANNEL, "up")
     again.open()
     ip("delete", CHANNEL)
     gone = complaint(again, opening=False)
@@ -77,6 +79,7 @@ def main() -> None:
         "ignored": ignored,
         "off_by_ms": abs(waited.time - sent) / 1e6,
         "down": down,
+        "still_down": still_down,
         "gone": gone,
         "absent": absent,
     }

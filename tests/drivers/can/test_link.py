@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import select
+import socket
 import time
 import tty
 import uuid
@@ -162,6 +163,46 @@ def test_the_stamps_of_a_node_show_in_the_report(link: CanLink, node: can.BusABC
 def test_what_cannot_be_opened_is_said_with_what_would_be_right(settings: CanSettings, text: str) -> None:
     with pytest.raises(LinkError, match=text):
         CanLink("bus", settings).open()
+
+
+class Refused(can.BusABC):
+    """A bus whose socket the kernel has bound, and against which it has something to say."""
+
+    def __init__(self, channel: str, **_settings: object) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as nobody:
+            nobody.bind(("127.0.0.1", 0))
+            self._socket.connect(nobody.getsockname())
+        self._socket.send(b"x")
+        assert select.select([self._socket], [], [], 5.0)[0], "the kernel's answer"
+        super().__init__(channel)
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise NotImplementedError
+
+    def shutdown(self) -> None:
+        super().shutdown()
+        self._socket.close()
+
+
+def test_an_interface_that_the_kernel_binds_but_that_is_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with ENETDOWN on vcan0 (see socketcan_session): the error waits in the socket, the bus is closed."""
+    monkeypatch.setitem(can.interfaces.BACKENDS, "socketcan", (__name__, "Refused"))
+    link = CanLink("bus", CanSettings(channel="vcan0"))
+    with pytest.raises(LinkError, match=r"bus: cannot open socketcan vcan0: .*Connection refused"):
+        link.open()
+    assert link.report().state == "opening"
+
+
+def test_what_is_raised_is_not_logged_at_every_attempt_besides(caplog: pytest.LogCaptureFixture) -> None:
+    link = CanLink("bus", CanSettings(interface="udp_multicast", channel="999.0.0.1"))
+    for _ in range(2):
+        with pytest.raises(LinkError):
+            link.open()
+    assert not caplog.records
 
 
 def test_an_absent_socketcan_interface() -> None:

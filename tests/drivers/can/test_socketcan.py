@@ -36,6 +36,8 @@ def test_a_bus_of_the_kernel() -> None:
     assert result["ignored"] == 0  # the kernel kept the unwanted frames out
     assert result["off_by_ms"] < 100.0
     assert "bring it up with ip link set vcan0 up" in result["down"]
+    assert "cannot open socketcan vcan0" in result["still_down"]
+    assert "bring it up with ip link set vcan0 up" in result["still_down"]
     assert "broke" in result["gone"]
     assert "cannot open socketcan vcan0" in result["absent"]
     assert "no such interface" in result["absent"]
