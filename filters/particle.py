@@ -23,6 +23,8 @@ M = TypeVar("M", bound=tuple[float | None, ...])
 
 POSE = ("north", "east", "heading")
 EVIDENCE_SAMPLE = 2048
+FAR = 1e4
+"""Square of the mean's distance from the reference over the variance; four digits of seven are lost."""
 _RESAMPLING_STREAM = 1 << 32
 
 
@@ -253,10 +255,19 @@ class ParticleFilter(Generic[Control]):
             sums, offset = self._sums_about(shift, north, east, heading)
         total = sums[0]
         n, e, h = sums[1] / total, sums[2] / total, sums[3] / total
+        if n * n + e * e > FAR * (sums[6] / total - n * n + sums[8] / total - e * e):
+            # the belief has jumped: single precision has no digits left for its spread about the old centre
+            centre[0] += n
+            centre[1] += e
+            north, east, _ = self._displaced(centre, shift)
+            sums, offset = self._sums_about(shift, north, east, heading)
+            total = sums[0]
+            n, e, h = sums[1] / total, sums[2] / total, sums[3] / total
         ne, nh, eh = sums[7] / total - n * e, sums[9] / total - n * h, sums[10] / total - e * h
         nn = max(sums[6] / total - n * n, 0.0)
         ee = max(sums[8] / total - e * e, 0.0)
         hh = max(sums[11] / total - 2.0 * offset * h + offset * offset, 0.0)
+        ne = math.copysign(min(abs(ne), math.sqrt(nn * ee)), ne)  # rounding: few particles lie on a line
         slow: list[float] = []
         variance = [nn, ee, hh]
         for row, place in enumerate(range(weights.SUMS, len(sums), 2), len(POSE)):

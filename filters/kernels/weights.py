@@ -28,7 +28,11 @@ NOTHING = float32(-1e30)
 
 @kernel("float32(float32[::1], int64, int64)")
 def peak(log_weights: Float32Array, first: int, last: int) -> np.float32:
-    """Largest log weight of a block; NaN if there is one (its bits order above infinity)."""
+    """Largest log weight of a block.
+
+    NaN orders by its sign bit: a positive one above infinity, a negative one (what processors make) below all, and
+    `exponentiate` gives it no weight.
+    """
     largest = int32(-2147483647)
     logs = log_weights[first:last]
     for i in range(last - first):

@@ -128,7 +128,7 @@ class Range:
         """Measured less expected distance at the centre, metres."""
         north = centre["north"] - measurement.north
         east = centre["east"] - measurement.east
-        expected = math.sqrt(north * north + east * east + measurement.down_difference**2)
+        expected = math.hypot(north, east, measurement.down_difference)
         if self.scale is not None:
             expected *= centre[self.scale]
         if self.bias is not None:

@@ -368,6 +368,42 @@ def test_a_count_out_of_bounds_is_refused(count: int) -> None:
     assert belief.count == 10
 
 
+# ---- after a jump
+
+
+def test_a_belief_that_jumps_is_measured_about_where_it_went() -> None:
+    """One measurement leaves 100 of 20,000 particles, 5 km from the centre, with a spread of 5 cm.
+
+    About the old centre a sum of squares in single precision cannot tell 25,000,000 m² from 25,000,000.0025.
+    """
+    rng = np.random.default_rng(5)
+    start = columns(20_000, spread=30.0)
+    start["north"][:100] = rng.normal(4000.0, 0.05, 100)
+    start["east"][:100] = rng.normal(-3000.0, 0.05, 100)
+    belief = ParticleFilter(QUIET, capacity=20_000, seed=1)
+    belief.initialize(start)
+    belief.weigh(Position(1.0, outliers=0.0), PositionMeasurement(4000.0, -3000.0))
+    north, east, _ = pose(belief)
+    w = belief.weights.astype(np.float64) / belief.weights.sum()
+    exact = np.cov(np.stack([north, east]), aweights=w, ddof=0)
+    moments = belief.moments()
+    np.testing.assert_allclose(moments.mean[:2], [north @ w, east @ w], atol=1e-3)
+    np.testing.assert_allclose(moments.pose_covariance[:2, :2], exact, atol=0.02 * exact[0, 0])
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=40, deadline=None)
+def test_the_covariance_of_two_particles_is_one(seed: int) -> None:
+    """Two places lie on a line; rounding must not make their correlation larger than one."""
+    rng = np.random.default_rng(seed)
+    start = columns(2, seed=seed) | {name: rng.uniform(-50, 50, 2) for name in ("north", "east")}
+    belief = ParticleFilter(QUIET, capacity=2, seed=1)
+    belief.initialize(start)
+    belief.weigh(Position(30.0), PositionMeasurement(7.25, 4.0))
+    nn, ne, ee = belief.moments().pose_covariance[[0, 0, 1], [0, 1, 1]]
+    assert ne * ne <= nn * ee * (1.0 + 1e-12)
+
+
 # ---- the same bytes
 
 
