@@ -26,6 +26,11 @@ def _floats(triple: Any) -> tuple[float, float, float]:
     return float(first), float(second), float(third)
 
 
+def _turned(longitude: float) -> float:
+    """Return the same meridian in -pi to pi: the 180th is no edge of the world."""
+    return longitude if -math.pi <= longitude <= math.pi else math.remainder(longitude, math.tau)
+
+
 class _Anchor(NamedTuple):
     """An exactly converted point and the derivative of the conversion there, column by column."""
 
@@ -65,7 +70,7 @@ class LocalFrame:
         point, a, b, c = anchor.point, anchor.per_north, anchor.per_east, anchor.per_down
         return Geodetic(
             point.latitude + x * a.latitude + y * b.latitude + z * c.latitude,
-            point.longitude + x * a.longitude + y * b.longitude + z * c.longitude,
+            _turned(point.longitude + x * a.longitude + y * b.longitude + z * c.longitude),
             point.altitude + x * a.altitude + y * b.altitude + z * c.altitude,
         )
 
@@ -78,7 +83,8 @@ class LocalFrame:
         def slope(x: float, y: float, z: float) -> Geodetic:
             ahead = self._exact(north + x * half, east + y * half, down + z * half)
             behind = self._exact(north - x * half, east - y * half, down - z * half)
-            return Geodetic(*((p - q) / (2 * half) for p, q in zip(ahead, behind, strict=True)))
+            latitude, longitude, altitude = (p - q for p, q in zip(ahead, behind, strict=True))
+            return Geodetic(latitude / (2 * half), _turned(longitude) / (2 * half), altitude / (2 * half))
 
         return _Anchor(
             (north, east, down),

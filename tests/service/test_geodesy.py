@@ -41,6 +41,16 @@ def test_small_steps_agree_with_the_radii_of_curvature() -> None:
     assert east == pytest.approx(parallel * step, rel=1e-6)
 
 
+def test_the_meridian_of_180_degrees_is_crossed_without_a_step() -> None:
+    """On Fiji: the way back closes on both sides of it, and longitudes stay within -180 to 180 degrees."""
+    frame = LocalFrame.from_degrees(-17.0, 180.0, 0.0)
+    for east in (-250.0, -60.0, -1.0, 1.0, 60.0, 250.0):
+        point = frame.geodetic_from_ned(10.0, east, 0.0)
+        assert -math.pi <= point.longitude <= math.pi
+        assert math.copysign(1.0, point.longitude) == -math.copysign(1.0, east)
+        assert np.allclose(frame.ned_from_geodetic(*point), (10.0, east, 0.0), atol=5e-3)
+
+
 def test_down_is_down() -> None:
     frame = LocalFrame.from_degrees(10.0, 20.0, 100.0)
     assert frame.ned_from_geodetic(math.radians(10.0), math.radians(20.0), 130.0)[2] == pytest.approx(-30.0)
