@@ -51,8 +51,27 @@ def _account() -> None:
         )  # fmt: skip
 
 
-def _owned(folder: Path) -> None:
+def _belongs_to_others(folder: Path) -> bool:
+    try:
+        return folder.owner() != USER
+    except KeyError:  # of an account that is no more: an earlier installation's
+        return False
+
+
+def owned(folder: Path) -> None:
+    """Make a folder of the service's own, or take over an empty one.
+
+    Raises
+    ------
+    InstallError
+        It holds what belongs to others: as the service's own they could not reach it any more.
+    """
     folder.mkdir(parents=True, exist_ok=True)
+    if folder not in (CACHE, STATE) and any(folder.iterdir()) and _belongs_to_others(folder):
+        raise InstallError(
+            f"{folder} is somebody else's and is not empty; name a folder of the service's own, "
+            f'as state.directory = "{STATE}"'
+        )
     folder.chmod(0o750)
     shutil.chown(folder, USER, USER)
 
@@ -72,7 +91,7 @@ def install(source: Path, name: str | None, say: Say) -> Names:
     Raises
     ------
     InstallError
-        Not root, no systemd, or a step was refused.
+        Not root, no systemd, a state directory that is somebody else's, or a step was refused.
     ConfigurationError
         The configuration is wrong; nothing was changed.
     """
@@ -82,7 +101,7 @@ def install(source: Path, name: str | None, say: Say) -> Names:
     say(f"user {USER}")
     _account()
     for folder in (CACHE, Path(configuration.state.directory)):
-        _owned(folder)
+        owned(folder)
     for path in copied(source.resolve(), names.configuration, USER):
         say(f"configuration {path}")
     call(*as_user(USER, str(script), "check", str(names.configuration)))

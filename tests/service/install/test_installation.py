@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from service.install import InstallError, install, uninstall
-from service.install.installation import executable
+from service.install.installation import executable, owned
 
 EXAMPLE = Path(__file__).parents[3] / "beliefd.example.toml"
 
@@ -35,6 +35,16 @@ def test_installing_needs_systemd_and_says_what_needs_none() -> None:
         InstallError, match="systemd is not running on this machine; beliefd run CONFIG needs none"
     ):
         install(EXAMPLE, None, silent)
+
+
+def test_a_folder_that_others_use_is_not_taken_from_them(tmp_path: Path) -> None:
+    """state.directory = "/var/lib" must not shut everybody else out of it."""
+    (tmp_path / "theirs").touch()
+    before = tmp_path.stat()
+    with pytest.raises(InstallError, match=r"is not empty; name a folder of the service's own"):
+        owned(tmp_path)
+    after = tmp_path.stat()
+    assert (after.st_uid, after.st_mode) == (before.st_uid, before.st_mode)
 
 
 def environment(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
