@@ -35,7 +35,13 @@ GAP = SECOND // 2
 SILENCE = SECOND
 """A source that said nothing for this long gives way to the next one in rank."""
 
-KEPT = 4 * SECOND
+SPEED_WINDOW = SECOND // 10
+"""Over which a speed is the mean."""
+
+FASTEST = 1e4
+FASTEST_TURN = 1e3
+"""m/s and rad/s. What is faster, or not finite, is no motion but a counter that jumped or a broken number: it would
+stay in the totals for ever."""
 
 
 class Motion(NamedTuple):
@@ -96,9 +102,10 @@ class Track:
         """Return the total at each of ``times``, all from one beginning."""
         return [self._at(time)[0] for time in times]
 
-    def rate(self, time: int, window: int = SECOND // 10) -> float:
-        """Return the mean rate over ``window`` about ``time``, per second."""
-        return self.between(time - window // 2, time + window // 2).total / (window / SECOND)
+    def rate(self, time: int) -> float:
+        """Return the mean rate over :data:`SPEED_WINDOW` about ``time``, per second."""
+        half = SPEED_WINDOW // 2
+        return self.between(time - half, time + half).total / (SPEED_WINDOW / SECOND)
 
     def _at(self, time: int) -> tuple[float, float]:
         times = self._times
@@ -138,7 +145,9 @@ class RateTrack(Track):
         """Append ``rate`` (per second) measured at ``time``."""
         latest = self.latest
         elapsed = 0 if latest is None else time - latest
-        if elapsed > GAP:
+        if latest is not None and elapsed == 0:
+            done = True  # the same instant again (a message with two motors): the later value knows more
+        elif elapsed > GAP:
             done = self.extend(time, self._rate * GAP / SECOND, (elapsed - GAP) / SECOND)
         else:
             done = self.extend(time, 0.5 * (self._rate + rate) * elapsed / SECOND)
@@ -148,10 +157,17 @@ class RateTrack(Track):
 
 
 class TotalTrack(Track):
-    """A track fed with a counter that may start anew: a new epoch, and whatever it missed is unknown."""
+    """A track fed with a counter that may start anew: a new epoch, and whatever it missed is unknown.
+
+    Attributes
+    ----------
+    jumps : int
+        How often the counter moved farther than anything can; that stretch is unknown, too.
+    """
 
     def __init__(self) -> None:
         super().__init__()
+        self.jumps = 0
         self._last: tuple[object, tuple[float, ...]] | None = None
 
     def append(self, time: int, distance: tuple[float, ...], epoch: object) -> bool:
@@ -159,15 +175,21 @@ class TotalTrack(Track):
 
         ``epoch`` is whatever tells one counter from another; between two of them the distance is unknown.
         """
-        previous, latest = self._last, self.latest
-        if previous is None or previous[0] != epoch or len(previous[1]) != len(distance):
-            done = self.extend(time, 0.0, 0.0 if latest is None else (time - latest) / SECOND)
-        else:
-            steps = [now - before for now, before in zip(distance, previous[1], strict=True)]
-            done = self.extend(time, sum(steps) / len(steps))
+        elapsed = 0.0 if self.latest is None else (time - self.latest) / SECOND
+        step = self._step(distance, epoch)
+        if step is not None and elapsed > 0.0 and not abs(step) <= FASTEST * elapsed:
+            self.jumps += 1
+            step = None
+        done = self.extend(time, 0.0, elapsed) if step is None else self.extend(time, step)
         if done:
             self._last = (epoch, distance)
         return done
+
+    def _step(self, distance: tuple[float, ...], epoch: object) -> float | None:
+        """Return how far the wheels' mean moved since the last totals; ``None`` if these are of another counter."""
+        if self._last is None or self._last[0] != epoch or len(self._last[1]) != len(distance):
+            return None
+        return sum(now - before for now, before in zip(distance, self._last[1], strict=True)) / len(distance)
 
 
 class Source(NamedTuple):
@@ -231,6 +253,11 @@ class Controls:
         ``auto``, or the one source (as the wire names it) that may speak.
     throttle : Throttle or None
         Which actuator drives; its command is the last resort for the speed.
+
+    Attributes
+    ----------
+    out_of_order, implausible : int
+        Readings that were not used: older than the one before of the same speaker, or no motion at all.
     """
 
     def __init__(
@@ -247,8 +274,9 @@ class Controls:
         self.yaw_rate_from = yaw_rate_from
         self.throttle = throttle
         self.out_of_order = 0
-        self._motors: dict[int, float] = {}
-        self._difference: tuple[int, float, int] | None = None
+        self.implausible = 0
+        self._motors: dict[tuple[str, str], dict[int, tuple[int, float]]] = {}
+        self._difference: tuple[int, float, object] | None = None
         self._distance: Track = Track()
         self._turn: Track = Track()
         self._speaker = Choice()
@@ -289,18 +317,14 @@ class Controls:
     def _take_distance(self, sample: Sample) -> bool:
         reading = sample.reading
         if isinstance(reading, Odometer):
-            if self._may_speak(self._speaker, self.speed_from, sample, 0):
-                self._feed_total(sample, reading)
-                self._turn_of_wheels(sample, reading)
+            self._take_odometer(sample, reading)
             return True
         if isinstance(reading, Speed):
             self._take_speed(sample, reading.speed, 1)
             return True
         if isinstance(reading, MotorSpeed):
-            self._motors[reading.index] = reading.angular_speed
             if self.wheel_radius is not None:
-                mean = math.fsum(self._motors.values()) / len(self._motors)
-                self._take_speed(sample, mean * self.wheel_radius, 2)
+                self._take_motor(sample, reading, self.wheel_radius)
             return True
         if isinstance(reading, MotionCommand):
             if reading.velocity is not None:
@@ -314,6 +338,24 @@ class Controls:
             return True
         return False
 
+    def _take_odometer(self, sample: Sample, reading: Odometer) -> None:
+        if not reading.distance:
+            self.implausible += 1
+        elif self._may_speak(self._speaker, self.speed_from, sample, 0):
+            self._feed_total(sample, reading)
+            self._turn_of_wheels(sample, reading)
+
+    def _take_motor(self, sample: Sample, reading: MotorSpeed, radius: float) -> None:
+        """Feed the mean speed of the motors of one source that have been heard lately."""
+        speed = reading.angular_speed * radius
+        if not abs(speed) <= FASTEST:
+            self.implausible += 1
+            return
+        motors = self._motors.setdefault((sample.link, sample.source), {})
+        motors[reading.index] = (sample.time, speed)
+        heard = [speed for time, speed in motors.values() if sample.time - time <= SILENCE]
+        self._take_speed(sample, math.fsum(heard) / len(heard), 2)
+
     def _take_command(self, sample: Sample, reading: ActuatorCommand) -> None:
         throttle = self.throttle
         if throttle is not None and throttle.channel <= len(reading.channels):
@@ -326,8 +368,9 @@ class Controls:
         if self.wheel_track is None or len(reading.distance) < 2:
             return
         difference, previous = reading.distance[0] - reading.distance[1], self._difference
-        self._difference = (sample.time, difference, reading.epoch)
-        if previous is None or previous[2] != reading.epoch:
+        epoch = (sample.link, sample.source, reading.epoch)
+        self._difference = (sample.time, difference, epoch)
+        if previous is None or previous[2] != epoch:
             return
         elapsed = sample.time - previous[0]
         if 0 < elapsed < GAP:
@@ -342,13 +385,19 @@ class Controls:
         return choice.accepts(Source(rank, sample.link, name), sample.time)
 
     def _feed_total(self, sample: Sample, reading: Odometer) -> None:
-        if not isinstance(self._distance, TotalTrack):
-            self._distance = TotalTrack()
-        self.out_of_order += not self._distance.append(
+        track = self._distance
+        if not isinstance(track, TotalTrack):
+            track = self._distance = TotalTrack()
+        jumps = track.jumps
+        self.out_of_order += not track.append(
             sample.time, reading.distance, (sample.link, sample.source, reading.epoch)
         )
+        self.implausible += track.jumps - jumps
 
     def _take_speed(self, sample: Sample, speed: float, rank: int) -> None:
+        if not abs(speed) <= FASTEST:
+            self.implausible += 1
+            return
         if not self._may_speak(self._speaker, self.speed_from, sample, rank):
             return
         if not isinstance(self._distance, RateTrack):
@@ -356,6 +405,9 @@ class Controls:
         self.out_of_order += not self._distance.append(sample.time, speed)
 
     def _take_yaw_rate(self, sample: Sample, rate: float, rank: int, name: str = "") -> None:
+        if not abs(rate) <= FASTEST_TURN:
+            self.implausible += 1
+            return
         if not self._may_speak(self._gyro, self.yaw_rate_from, sample, rank, name):
             return
         if not isinstance(self._turn, RateTrack):

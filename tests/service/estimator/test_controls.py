@@ -184,6 +184,176 @@ def test_an_actuator_speaks_last_and_only_when_it_is_named() -> None:
     assert named.sources[0] == "WHEEL_DISTANCE"
 
 
+def test_two_motors_of_one_message_are_averaged_at_its_time() -> None:
+    """RPM has two sensors and one stamp: the second is no sample out of order."""
+    controls = Controls(wheel_radius=0.1)
+    for k in range(11):
+        for index, speed in ((0, 10.0 + k), (1, 30.0 + k)):
+            controls.take(sample(k * 100 * MS, MotorSpeed(index, speed), "RPM"))
+    assert controls.out_of_order == 0
+    assert controls.distance(100 * MS, SECOND).total == pytest.approx(0.9 * 0.1 * (20.0 + 5.5), rel=0.02)
+
+
+def test_a_motor_that_fell_silent_or_is_anothers_has_no_say() -> None:
+    controls = Controls(wheel_radius=0.1)
+    controls.take(sample(0, MotorSpeed(1, 1000.0), "esc.Status"))
+    for k in range(11):
+        time = 2 * SECOND + k * 100 * MS
+        controls.take(sample(time, MotorSpeed(0, 20.0), "esc.Status"))
+        controls.take(sample(time + 1, MotorSpeed(2, 500.0), "sample/motor"))
+    assert controls.distance(2 * SECOND, 3 * SECOND).total == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("broken", [math.nan, math.inf, -1e200, 1e9])
+def test_a_broken_number_is_counted_and_leaves_the_totals_alone(broken: float) -> None:
+    controls = Controls(wheel_radius=0.1)
+    for k in range(21):
+        at = k * 50 * MS
+        if k == 10:
+            controls.take(sample(at, Odometer((broken,))))
+            controls.take(imu(at, broken))
+            controls.take(sample(at, MotorSpeed(0, broken)))
+        else:
+            controls.take(sample(at, Odometer((0.05 * k,))))
+            controls.take(imu(at, 0.5))
+    assert controls.implausible == 4  # to the broken total and back from it, a rate, a motor
+    assert controls.turn(0, SECOND) == pytest.approx((0.5, 0.0))
+    distance = controls.distance(0, SECOND)
+    assert distance.total == pytest.approx(0.9)
+    assert distance.unknown == pytest.approx(0.1)
+
+
+def test_an_odometer_without_wheels_is_none() -> None:
+    controls = Controls()
+    for k in range(2):
+        controls.take(sample(k * SECOND, Odometer(())))
+    assert controls.implausible == 2
+    assert controls.sources[0] is None
+
+
+def test_two_counters_make_no_turn_together() -> None:
+    """Left less right is 0 m for the first counter and 5 m for the one that takes over: nothing has turned."""
+    controls = Controls(wheel_track=0.5)
+    for k in range(10):
+        controls.take(sample(k * 50 * MS, Odometer((0.0, 0.0)), "b"))
+    for k in range(10, 20):
+        controls.take(sample(k * 50 * MS, Odometer((5.0, 0.0)), "a"))
+    assert controls.sources[0] == "a"
+    assert controls.turn(0, SECOND).total == 0.0
+
+
+def test_two_motors_of_one_message_are_averaged_at_its_time() -> None:
+    """RPM has two sensors and one stamp: the second is no sample out of order."""
+    controls = Controls(wheel_radius=0.1)
+    for k in range(11):
+        for index, speed in ((0, 10.0 + k), (1, 30.0 + k)):
+            controls.take(sample(k * 100 * MS, MotorSpeed(index, speed), "RPM"))
+    assert controls.out_of_order == 0
+    assert controls.distance(100 * MS, SECOND).total == pytest.approx(0.9 * 0.1 * (20.0 + 5.5), rel=0.02)
+
+
+def test_a_motor_that_fell_silent_or_is_anothers_has_no_say() -> None:
+    controls = Controls(wheel_radius=0.1)
+    controls.take(sample(0, MotorSpeed(1, 1000.0), "esc.Status"))
+    for k in range(11):
+        time = 2 * SECOND + k * 100 * MS
+        controls.take(sample(time, MotorSpeed(0, 20.0), "esc.Status"))
+        controls.take(sample(time + 1, MotorSpeed(2, 500.0), "another"))
+    assert controls.distance(2 * SECOND, 3 * SECOND).total == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("broken", [math.nan, math.inf, -1e200, 1e9])
+def test_a_broken_number_is_counted_and_leaves_the_totals_alone(broken: float) -> None:
+    controls = Controls(wheel_radius=0.1)
+    for k in range(21):
+        at = k * 50 * MS
+        if k == 10:
+            controls.take(sample(at, Odometer((broken,))))
+            controls.take(imu(at, broken))
+            controls.take(sample(at, MotorSpeed(0, broken)))
+        else:
+            controls.take(sample(at, Odometer((0.05 * k,))))
+            controls.take(imu(at, 0.5))
+    assert controls.implausible == 4  # to the broken total and back from it, a rate, a motor
+    assert controls.turn(0, SECOND) == pytest.approx((0.5, 0.0))
+    distance = controls.distance(0, SECOND)
+    assert distance.total == pytest.approx(0.9)
+    assert distance.unknown == pytest.approx(0.1)
+
+
+def test_an_odometer_without_wheels_is_none() -> None:
+    controls = Controls()
+    for k in range(2):
+        controls.take(sample(k * SECOND, Odometer(())))
+    assert controls.implausible == 2
+    assert controls.sources[0] is None
+
+
+def test_the_wheels_of_two_vehicles_parts_make_no_turn_together() -> None:
+    """Left less right is 5 m for one counter and 0 for the other: no yaw rate of 10 rad/s between them."""
+    controls = Controls(wheel_track=0.5)
+    for k in range(20):
+        controls.take(sample(2 * k * 10 * MS, Odometer((5.0, 0.0)), "a"))
+        controls.take(sample(2 * k * 10 * MS + 1500 * MS, Odometer((0.0, 0.0)), "b"))
+    assert controls.turn(0, 2 * SECOND).total == 0.0
+
+
+def test_two_motors_of_one_message_are_averaged_at_its_time() -> None:
+    """RPM has two sensors and one stamp: the second is no sample out of order."""
+    controls = Controls(wheel_radius=0.1)
+    for k in range(11):
+        for index, speed in ((0, 10.0 + k), (1, 30.0 + k)):
+            controls.take(sample(k * 100 * MS, MotorSpeed(index, speed), "RPM"))
+    assert controls.out_of_order == 0
+    assert controls.distance(100 * MS, SECOND).total == pytest.approx(0.9 * 0.1 * (20.0 + 5.5), rel=0.02)
+
+
+def test_a_motor_that_fell_silent_or_is_anothers_has_no_say() -> None:
+    controls = Controls(wheel_radius=0.1)
+    controls.take(sample(0, MotorSpeed(1, 1000.0), "esc.Status"))
+    for k in range(11):
+        time = 2 * SECOND + k * 100 * MS
+        controls.take(sample(time, MotorSpeed(0, 20.0), "esc.Status"))
+        controls.take(sample(time + 1, MotorSpeed(2, 500.0), "another"))
+    assert controls.distance(2 * SECOND, 3 * SECOND).total == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("broken", [math.nan, math.inf, -1e200, 1e9])
+def test_a_broken_number_is_counted_and_leaves_the_totals_alone(broken: float) -> None:
+    controls = Controls(wheel_radius=0.1)
+    for k in range(21):
+        at = k * 50 * MS
+        if k == 10:
+            controls.take(sample(at, Odometer((broken,))))
+            controls.take(imu(at, broken))
+            controls.take(sample(at, MotorSpeed(0, broken)))
+        else:
+            controls.take(sample(at, Odometer((0.05 * k,))))
+            controls.take(imu(at, 0.5))
+    assert controls.implausible == 4  # to the broken total and back from it, a rate, a motor
+    assert controls.turn(0, SECOND) == pytest.approx((0.5, 0.0))
+    distance = controls.distance(0, SECOND)
+    assert distance.total == pytest.approx(0.9)
+    assert distance.unknown == pytest.approx(0.1)
+
+
+def test_an_odometer_without_wheels_is_none() -> None:
+    controls = Controls()
+    for k in range(2):
+        controls.take(sample(k * SECOND, Odometer(())))
+    assert controls.implausible == 2
+    assert controls.sources[0] is None
+
+
+def test_the_wheels_of_two_vehicles_parts_make_no_turn_together() -> None:
+    """Left less right is 5 m for one counter and 0 for the other: no yaw rate of 10 rad/s between them."""
+    controls = Controls(wheel_track=0.5)
+    for k in range(20):
+        controls.take(sample(2 * k * 10 * MS, Odometer((5.0, 0.0)), "a"))
+        controls.take(sample(2 * k * 10 * MS + 1500 * MS, Odometer((0.0, 0.0)), "b"))
+    assert controls.turn(0, 2 * SECOND).total == 0.0
+
+
 def test_what_is_no_control_is_left_to_others() -> None:
     assert not Controls().take(sample(0, Pressure(101325.0)))
 
