@@ -42,6 +42,8 @@ class Facts:
         Metres.
     afforded, minimum : int
         Particles that the budget allows, and the fewest that make a filter.
+    delay : int
+        Nanoseconds by which the belief lies behind ``now``: how old even the newest measurement is.
     """
 
     now: int
@@ -50,6 +52,7 @@ class Facts:
     radius95: float | None
     afforded: int
     minimum: int
+    delay: int = 0
 
 
 @dataclass(slots=True)
@@ -94,7 +97,7 @@ class HealthMonitor:
 
     def _verdict(self, facts: Facts) -> tuple[HealthState, str]:
         if not facts.started or facts.radius95 is None:
-            return HealthState.WAITING, "no data yet: " + ", ".join(facts.missing)
+            return HealthState.WAITING, _awaited(facts)
         radius = facts.radius95
         if facts.afforded < facts.minimum:
             return (
@@ -116,7 +119,7 @@ class HealthMonitor:
         if self._last_reading is None:
             return f"no absolute measurement yet{missing}"
         age = facts.now - self._last_reading
-        if age > SILENCE:
+        if age > SILENCE + facts.delay:
             return (
                 f"no absolute measurement for {age / SECOND:.0f} s, the last was {self._last_kind}{missing}"
             )
@@ -129,3 +132,9 @@ class HealthMonitor:
             return HealthState.CONVERGING, f"95 % within {radius:.1f} m, above {CONVERGED_RADIUS:.0f} m"
         self._placed = True
         return HealthState.TRACKING, "measurements agree with the belief"
+
+
+def _awaited(facts: Facts) -> str:
+    if facts.missing:
+        return "no data yet: " + ", ".join(facts.missing)
+    return "no data yet that the belief could start from"

@@ -2,7 +2,7 @@
 
 The one place that knows both languages: a :class:`~drivers.sample.Sample` says what the wire said; a model of
 :mod:`filters.sensing` wants metres north and east of the origin, with a sigma. A reading that cannot be expressed (no
-origin yet, no such beacon, not finite) is refused with a reason, and the reason is counted.
+origin yet, no such beacon) is refused with a reason, and the reason is counted.
 """
 
 from __future__ import annotations
@@ -50,11 +50,17 @@ CORRELATION = {"position": 1.0, "velocity": 1.0, "range": 0.0, "heading": 1.0}
 """Seconds over which a sensor's errors stay alike. Readings closer together repeat each other's errors: each is given
 the variance that makes all of them together worth one independent reading per this time."""
 
+SHORTEST_INTERVAL = 1e-3
+"""Seconds; readings of the same instant count as so far apart: two receivers with one clock, or one said twice."""
+
 TIMING = 0.02
 """Seconds by which a stamp may be off after its clock was mapped: at speed v, v times this many metres."""
 
 SPAN = {"position": 1000.0, "velocity": 100.0, "range": 200.0, "heading": 2 * math.pi}
 """How widely outliers scatter, per dimension: m, m/s, m, rad."""
+
+NOMINAL_OUTLIERS = 0.01
+"""Share of readings that mean nothing by which health judges a sensor that claims to have none."""
 
 SLOWEST_COURSE = 0.3
 """m/s; below this the direction of a measured velocity is noise."""
@@ -82,6 +88,10 @@ class Measurement(NamedTuple):
         The model's own measurement type.
     absolute : bool
         Whether it says where the vehicle is (a position, a range), not only how it moves or points.
+    log_outlier : float
+        Logarithm of the outlier part's density, in the reading's own space.
+    repeats : float
+        How many readings share one independent error; the sigma of ``value`` has it already.
     """
 
     name: str
@@ -89,6 +99,7 @@ class Measurement(NamedTuple):
     value: Any
     absolute: bool
     log_outlier: float
+    repeats: float
 
     def surprise(self, log_mean: float) -> float:
         """Return the probability, 0…1, that the reading is the outlier part's, given its evidence."""
@@ -133,6 +144,7 @@ class BoundSensor:
         self._measure = _MEASURES[settings.kind]
         self._last_magnetic = -(2**62)
         self._last_time = -(2**62)
+        self._repeats = 1.0
         self.model = model_of(settings)
         self._log_outlier = log_outlier_density(settings)
 
@@ -173,7 +185,12 @@ class BoundSensor:
         if isinstance(outcome, str):
             return Refusal(name, outcome)
         return Measurement(
-            name, self.model, outcome, self.settings.kind in ("position", "range"), self._log_outlier
+            name,
+            self.model,
+            outcome,
+            self.settings.kind in ("position", "range"),
+            self._log_outlier,
+            self._repeats,
         )
 
     def sigma(self, claimed: float | None) -> float:
@@ -186,14 +203,14 @@ class BoundSensor:
         sigma = self.sigma(claimed)
         if self.settings.kind in ("position", "range"):
             sigma = math.hypot(sigma, TIMING * place.controls.speed(place.time))
-        return sigma * math.sqrt(self._repeats(place.time))
+        self._count_repeats(place.time)
+        return sigma * math.sqrt(self._repeats)
 
-    def _repeats(self, time: int) -> float:
-        """Return how many readings share one independent error, from the interval to the one before."""
-        correlation = CORRELATION[self.settings.kind]
-        interval = (time - self._last_time) / SECOND
+    def _count_repeats(self, time: int) -> None:
+        """Note how many readings share one independent error, from the interval to the one before."""
+        interval = max(SHORTEST_INTERVAL, (time - self._last_time) / SECOND)
         self._last_time = time
-        return max(1.0, correlation / interval) if 0.0 < interval < correlation else 1.0
+        self._repeats = max(1.0, CORRELATION[self.settings.kind] / interval)
 
 
 def model_of(settings: Sensor) -> SensorModel[Any]:
@@ -224,26 +241,23 @@ def position_of(
 
 
 def log_outlier_density(settings: Sensor) -> float:
-    """Return the logarithm of the outlier part's density in the reading's own space."""
-    if settings.outliers == 0.0:
-        return -math.inf
+    """Return the logarithm of the outlier part's density in the reading's own space.
+
+    A model without that part is judged as if it had a small one: nothing would ever surprise it.
+    """
     dimensions = 2 if settings.kind in ("position", "velocity") else 1
-    return math.log(settings.outliers) - dimensions * math.log(SPAN[settings.kind])
+    return math.log(settings.outliers or NOMINAL_OUTLIERS) - dimensions * math.log(SPAN[settings.kind])
 
 
 def _measure_position(sensor: BoundSensor, reading: Any, place: Place) -> Any:
     fix = position_of(reading, place.frame)
     if fix is None:
         return "no_origin"
-    if not (math.isfinite(fix[0]) and math.isfinite(fix[1])):
-        return "not_finite"
     return PositionMeasurement(fix[0], fix[1], sensor.spread(reading.sigma_horizontal, place))
 
 
 def _measure_velocity(sensor: BoundSensor, reading: Any, place: Place) -> Any:
     speed = place.controls.speed(place.time)
-    if not (math.isfinite(reading.north) and math.isfinite(reading.east)):
-        return "not_finite"
     if abs(speed) < SLOWEST_COURSE:
         return "standing"
     return VelocityMeasurement(reading.north, reading.east, speed, sensor.spread(reading.sigma, place))
@@ -304,6 +318,3 @@ _MEASURES = {
     "range": _measure_range,
     "heading": _measure_heading,
 }
-
-SUPPORTED = tuple(_MEASURES)
-"""The kinds of ``[[sensor]]`` that have a model."""

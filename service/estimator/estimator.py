@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.plausibility import implausible
 from drivers.sample import GeodeticPosition, LocalPosition, Origin, Sample
 from filters.kld import Demand
 from filters.particle import ParticleFilter
@@ -59,6 +60,11 @@ START_COUNT = 10_000
 DEMAND_INTERVAL = SECOND // 5
 GROWTH = 1.25
 """The set grows between resamplings only if the demand is this much larger than the count."""
+
+
+MOST_RECORDS = 256
+OTHERS = "others"
+"""Beacons' numbers come from outside: beyond this many names their readings are recorded under one."""
 
 
 class Waiting(NamedTuple):
@@ -110,7 +116,7 @@ class Estimator:
         self._timeline: Timeline[Waiting] = Timeline()
         self._records: dict[str, SensorRecord] = {}
         self._heard: set[str] = set()
-        self._unwanted: Counter[str] = Counter()
+        self._dropped: Counter[str] = Counter()
         self._frame = self._configured_frame()
         self._output = Output(self._vehicle, self._filter)
         self._belief_time: int | None = None
@@ -122,34 +128,47 @@ class Estimator:
     # --- samples in ---------------------------------------------------------------------------------------------
 
     def ingest(self, samples: Iterable[Sample]) -> None:
-        """Take samples as they arrive: controls at once, measurements into the timeline, the rest counted."""
+        """Take samples as they arrive: controls at once, measurements into the timeline.
+
+        Whatever they hold, nothing is raised. A driver refuses what cannot be true; should it come all the same, it
+        is refused here and counted, because one number that is not finite would spoil the belief for ever.
+        """
         for sample in samples:
             reading = sample.reading
-            if isinstance(reading, Origin):
-                self._learn_origin(Geodetic(reading.latitude, reading.longitude, reading.altitude))
-            elif sample.time > sample.received + FUTURE_TOLERANCE:
-                self._timeline.refused["future"] += 1
+            if sample.time > sample.received + FUTURE_TOLERANCE:
+                self._dropped["future"] += 1
+            elif isinstance(reading, Origin):
+                self._hear_origin(reading)
             else:
-                controlled = self._controls.take(sample)
-                if not self._queue(sample) and not controlled:
-                    self._unwanted[sample.source] += 1
+                self._controls.take(sample)
+                self._queue(sample)
 
-    def _queue(self, sample: Sample) -> bool:
-        wanted = False
+    def _hear_origin(self, origin: Origin) -> None:
+        if implausible(origin) is None:
+            self._learn_origin(Geodetic(origin.latitude, origin.longitude, origin.altitude))
+        else:
+            self._dropped["implausible"] += 1
+
+    def _queue(self, sample: Sample) -> None:
+        """Have ``sample`` wait for the horizon, for every sensor that wants it."""
         for sensor in self._sensors:
             if sensor.wants(sample):
-                wanted = True
-                self._heard.add(sensor.title)
                 record = self._record(sensor.name(sample))
                 record.arrivals += 1
+                if implausible(sample.reading) is not None:
+                    self._dropped["implausible"] += 1
+                    record.refused["implausible"] += 1
+                    continue
+                self._heard.add(sensor.title)
                 reason = self._timeline.insert(
                     Waiting(sensor, sample), sample.time - sensor.delay, sample.received
                 )
                 if reason is not None:
                     record.refused[reason] += 1
-        return wanted
 
     def _record(self, name: str) -> SensorRecord:
+        if name not in self._records and len(self._records) >= MOST_RECORDS:
+            name = OTHERS
         return self._records.setdefault(name, SensorRecord())
 
     def _configured_frame(self) -> LocalFrame | None:
@@ -179,14 +198,14 @@ class Estimator:
         self._stopwatch.lap("ingest")
         afforded = min(afforded, self._filter.capacity)
         if self._belief_time is None:
-            passed = self._try_start(horizon, passed, afforded)
+            passed = self._try_start(horizon, self._fresh(horizon, passed), afforded)
         if self._belief_time is not None:
             self._fuse(passed, afforded)
             if horizon - self._belief_time >= STRIDE:
                 self._advance(horizon)
             self._fit_count(afforded)
-            self._controls.forget(self._belief_time - SECOND)
             self._reckon_demand(now)
+        self._controls.forget((horizon if self._belief_time is None else self._belief_time) - SECOND)
         estimate = self._speak(now, unix, afforded)
         self._sequence += 1
         self._stopwatch.lap("extraction")
@@ -224,7 +243,7 @@ class Estimator:
         if isinstance(measured, Refusal):
             record.refused[measured.reason] += 1
             return
-        self._vehicle.level(waiting.sample.reading, self._frame)
+        self._vehicle.level(waiting.sample.reading, self._frame, measured.repeats)
         self._take_evidence(time, measured, record)
         self._stopwatch.lap("sensing")
 
@@ -266,6 +285,17 @@ class Estimator:
 
     # --- start --------------------------------------------------------------------------------------------------
 
+    def _fresh(self, horizon: int, passed: list[tuple[int, Waiting]]) -> list[tuple[int, Waiting]]:
+        """Refuse what is older than a start may lie back: it waited in a queue while nobody ran."""
+        fresh = [(time, waiting) for time, waiting in passed if time >= horizon - SECOND]
+        for _, waiting in passed[: len(passed) - len(fresh)]:
+            self._refuse(waiting, "late")
+            self._dropped["late"] += 1
+        return fresh
+
+    def _refuse(self, waiting: Waiting, reason: str) -> None:
+        self._record(waiting.sensor.name(waiting.sample)).refused[reason] += 1
+
     def _try_start(
         self, horizon: int, passed: list[tuple[int, Waiting]], afforded: int
     ) -> list[tuple[int, Waiting]]:
@@ -284,19 +314,26 @@ class Estimator:
 
     def _start_at_fix(self, passed: list[tuple[int, Waiting]], afforded: int) -> list[tuple[int, Waiting]]:
         for index, (time, waiting) in enumerate(passed):
-            reading = waiting.sample.reading
-            if isinstance(reading, GeodeticPosition | LocalPosition):
-                if isinstance(reading, GeodeticPosition):
-                    altitude = 0.0 if reading.altitude is None else reading.altitude
-                    self._learn_origin(Geodetic(reading.latitude, reading.longitude, altitude))
-                fix = position_of(reading, self._frame)
-                if fix is None:
-                    continue
-                sigma = waiting.sensor.sigma(reading.sigma_horizontal)
-                down_sigma = reading.sigma_vertical or 2 * sigma
-                self._start(time, Anchor(fix, (sigma, sigma, down_sigma)), afforded)
+            anchor = self._anchor_of(waiting)
+            if anchor is not None:
+                self._start(time, anchor, afforded)
                 return passed[index + 1 :]
+            self._refuse(waiting, "before_start")
         return []
+
+    def _anchor_of(self, waiting: Waiting) -> Anchor | None:
+        """Return where a position fix says to start, with the origin learned from it if there was none."""
+        reading = waiting.sample.reading
+        if not isinstance(reading, GeodeticPosition | LocalPosition):
+            return None
+        if isinstance(reading, GeodeticPosition):
+            altitude = 0.0 if reading.altitude is None else reading.altitude
+            self._learn_origin(Geodetic(reading.latitude, reading.longitude, altitude))
+        fix = position_of(reading, self._frame)
+        if fix is None:
+            return None
+        sigma = waiting.sensor.sigma(reading.sigma_horizontal)
+        return Anchor(fix, (sigma, sigma, reading.sigma_vertical or 2 * sigma))
 
     def _start(self, time: int, anchor: Anchor | None, afforded: int) -> None:
         wanted = self._filter.capacity if anchor is None else START_COUNT
@@ -319,6 +356,7 @@ class Estimator:
             pose.radius95 if pose else None,
             afforded,
             self.configuration.budget.particles_min,
+            now - self._timeline.horizon,
         )
         state = self.health.judge(facts)
         return self._output.estimate(
@@ -354,10 +392,10 @@ class Estimator:
     @property
     def drops(self) -> dict[str, int]:
         """What came and was not used, since the start."""
-        counts = dict(self._timeline.refused)
-        if self._controls.out_of_order:
-            counts["control out of order"] = self._controls.out_of_order
-        return counts
+        counts = self._dropped + self._timeline.refused
+        counts["control out of order"] = self._controls.out_of_order
+        counts["control implausible"] = self._controls.implausible
+        return {what: count for what, count in counts.items() if count}
 
     def sensors(self, now: int) -> list[SensorStatus]:
         """Return every sensor's status; rates are over the time since the last call."""

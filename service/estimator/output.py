@@ -27,6 +27,7 @@ class Pose(NamedTuple):
     moments: Moments
     covariance: NDArray[np.float64]
     speed: float
+    speed_variance: float
     radius95: float
 
     def mean(self, name: str) -> float:
@@ -66,7 +67,9 @@ class Output:
         )
         self.displacement = displacement
         speed = self._vehicle.controls.speed(now) * self._biases[1]
-        return Pose(moments, covariance, speed, radius(covariance[:2, :2], 0.95))
+        return Pose(
+            moments, covariance, speed, self._vehicle.speed_variance(now), radius(covariance[:2, :2], 0.95)
+        )
 
     def estimate(self, pose: Pose | None, frame: LocalFrame | None, **figures: Any) -> Estimate:
         """Write ``pose`` down; ``figures`` are the fields of :class:`Estimate` that the belief does not know."""
@@ -92,7 +95,7 @@ class Output:
         height = self._vehicle.height
         nn, ne, ee = (float(pose.covariance[i, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
         heading_variance = float(pose.covariance[2, 2])
-        velocity = velocity_moments(pose.speed, self._vehicle.speed_noise**2, heading, heading_variance)
+        velocity = velocity_moments(pose.speed, pose.speed_variance, heading, heading_variance)
         latitude, longitude, altitude = self._geodetic(frame, north, east, height)
         return Estimate(
             position=(north, east, None if height is None else height[0]),

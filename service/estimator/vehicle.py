@@ -18,7 +18,7 @@ from filters.motion.slow import RandomWalk
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from service.config import Configuration
-from service.estimator.controls import SECOND, Controls, Throttle
+from service.estimator.controls import SECOND, SPEED_WINDOW, Controls, Throttle
 from service.estimator.start import Anchor
 from service.geodesy import LocalFrame
 
@@ -120,10 +120,13 @@ class Vehicle:
         """Return the process noise of an interval, as the motion model has it."""
         return IntervalNoise(*self.motion.noise_variances(self._control(start, end), (end - start) / SECOND))
 
-    @property
-    def speed_noise(self) -> float:
-        """Standard deviation of the speed that is published, m/s."""
-        return self.motion.speed_noise
+    def speed_variance(self, time: int) -> float:
+        """Return the variance of the speed that is published for ``time``, (m/s)².
+
+        Where the odometry is silent the vehicle may drive as it likes.
+        """
+        silent = self.controls.distance(time - SPEED_WINDOW // 2, time + SPEED_WINDOW // 2).unknown
+        return self.motion.speed_noise**2 + UNKNOWN_SPEED**2 * min(1.0, silent * SECOND / SPEED_WINDOW)
 
     # --- height -------------------------------------------------------------------------------------------------
 
@@ -146,8 +149,12 @@ class Vehicle:
         height = self.height
         return 0.0 if height is None else height[0]
 
-    def level(self, reading: AnyReading, frame: LocalFrame | None) -> None:
-        """Correct the height by a position that brings one."""
+    def level(self, reading: AnyReading, frame: LocalFrame | None, repeats: float) -> None:
+        """Correct the height by a position that brings one.
+
+        Its errors are as alike from fix to fix as those of the plane: ``repeats`` fixes share one, and each counts so
+        much less.
+        """
         measured = _down_of(reading, frame)
         if measured is None:
             return
@@ -155,7 +162,7 @@ class Vehicle:
         if self._height is None:
             self._height = KalmanFilter(np.array([down]), np.array([[sigma**2]]))
         else:
-            self._height.correct(np.array([down]), np.eye(1), np.array([[sigma**2]]))
+            self._height.correct(np.array([down]), np.eye(1), np.array([[repeats * sigma**2]]))
 
 
 def _down_of(reading: AnyReading, frame: LocalFrame | None) -> tuple[float, float] | None:

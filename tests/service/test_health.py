@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from service.estimate import HealthState
 from service.health import CONVERGED_RADIUS, LOST_RADIUS, SILENCE, Facts, HealthMonitor
 
@@ -55,6 +57,22 @@ def test_dead_reckons_without_absolute_measurements() -> None:
     assert "range/a/1" in monitor.reason
     monitor.measured(round(later * SECOND), "range/a/1", 0.02)
     assert monitor.judge(facts(later)) is HealthState.TRACKING
+
+
+def test_a_long_horizon_is_no_silence() -> None:
+    """Behind a horizon of 5 s the newest measurement there can be is 5 s old."""
+    monitor = HealthMonitor()
+    now = agreeing(monitor, 0, 2)
+    late = facts(now + 5.0)
+    assert monitor.judge(late) is HealthState.DEAD_RECKONING
+    assert monitor.judge(replace(late, delay=5 * SECOND)) is HealthState.TRACKING
+    assert monitor.judge(replace(facts(now + 8.2), delay=5 * SECOND)) is HealthState.DEAD_RECKONING
+
+
+def test_waiting_with_nothing_missing_still_has_a_reason() -> None:
+    monitor = HealthMonitor()
+    assert monitor.judge(facts(0, None, started=False)) is HealthState.WAITING
+    assert monitor.reason.endswith("start from")
 
 
 def test_is_lost_when_the_measurements_disagree_and_found_when_they_agree() -> None:

@@ -22,6 +22,7 @@ from drivers.sample import (
 from service.config import Configuration, validated
 from service.estimate import Estimate, HealthState
 from service.estimator import Estimator
+from service.estimator.estimator import MOST_RECORDS, OTHERS
 from service.geodesy import LocalFrame
 
 SECOND = 1_000_000_000
@@ -274,6 +275,127 @@ def test_local_positions_of_others_are_fused() -> None:
     last = list(run(Estimator(configuration(sensor=[{"kind": "position"}])), samples, 5))[-1]
     assert error(last) < 0.4
     assert last.position[2] == pytest.approx(-2.0, abs=0.5)
+
+
+def test_one_fix_said_twice_is_one_fix() -> None:
+    """Two receivers with one stamp, or one heard by two links, make the belief no surer than one does."""
+
+    def variance(sources: tuple[str, ...]) -> float:
+        drive = Drive(8)
+        samples: list[Sample] = []
+        for k in range(100):
+            t = k / 20
+            samples += drive.controls(t)
+            north, east, _ = drive.pose(t)
+            if k % 20 == 0:
+                samples += [drive.sample(t, LocalPosition(north, east, -2.0), name) for name in sources]
+        last = list(run(Estimator(configuration(sensor=[{"kind": "position", "sigma": 0.3}])), samples, 5))[
+            -1
+        ]
+        return (last.position_covariance[0] or 0.0) + (last.position_covariance[3] or 0.0)
+
+    assert variance(("a", "b", "c", "d")) == pytest.approx(variance(("a",)), rel=0.15)
+
+
+def test_the_height_is_no_surer_for_being_told_more_often() -> None:
+    """A receiver's errors stay alike over a second: 20 fixes a second tell the height as well as two do."""
+
+    def variance(every: int) -> float:
+        drive = Drive(8)
+        samples: list[Sample] = []
+        for k in range(100):
+            t = k / 20
+            samples += drive.controls(t)
+            if k % every == 0:
+                north, east, _ = drive.pose(t)
+                samples.append(drive.sample(t, LocalPosition(north, east, -2.0, 1.0, 1.0)))
+        start = {"mode": "first_fix"}
+        estimator = Estimator(configuration(start=start, sensor=[{"kind": "position"}]))
+        return list(run(estimator, samples, 5))[-1].position_covariance[5] or 0.0
+
+    assert variance(1) == pytest.approx(variance(10), rel=0.2)
+
+
+def test_without_odometry_the_velocity_could_be_any() -> None:
+    estimates = list(run(Estimator(configuration()), ranged_drive(6, 3), 6))
+    driving, silent = estimates[140], estimates[-1]
+    assert math.sqrt(driving.velocity_covariance[0] or 0.0) < 0.2
+    assert math.sqrt((silent.velocity_covariance[0] or 0.0) + (silent.velocity_covariance[3] or 0.0)) > 1.9
+
+
+def test_a_sensor_without_outliers_can_be_wrong_all_the_same() -> None:
+    """Ranges that all read 15 m long: nothing fits them, and the belief says that it is lost."""
+    drive = Drive(2)
+    samples: list[Sample] = []
+    for k in range(120):
+        t = k / 20
+        samples += drive.controls(t)
+        north, east, _ = drive.pose(t)
+        beacon = k % 4 + 1
+        n, e, _ = BEACONS[beacon]
+        samples.append(drive.sample(t, Range(beacon, math.hypot(north - n, east - e) + 15.0)))
+    sensor = [{"kind": "range", "sigma": 0.3, "outliers": 0.0}]
+    last = list(run(Estimator(configuration(sensor=sensor)), samples, 6))[-1]
+    assert last.health is HealthState.LOST
+
+
+def test_a_measurement_from_a_queue_does_not_date_the_start_back() -> None:
+    """One range a minute old, kept in a socket while the loop was away: the belief starts now, as sure as told."""
+    drive = Drive(0)
+    fresh = [s for k in range(20) for s in drive.controls(100.0 + k / 20)]
+    stale = Sample(40 * SECOND, 100 * SECOND, "l", "S", Range(1, 42.0))
+    estimator = Estimator(configuration())
+    estimator.ingest([stale, *fresh])
+    estimate = estimator.tick(101 * SECOND, 0, 2000)
+    assert estimate.radius95 is not None
+    assert estimate.radius95 < 3.0
+    assert estimator.drops == {"late": 1}
+    assert [s.refused for s in estimator.sensors(101 * SECOND)] == [{"late": 1}]
+
+
+def test_what_comes_before_the_first_fix_is_counted() -> None:
+    sensor = [{"kind": "position"}, {"kind": "range"}]
+    estimator = Estimator(configuration(start={"mode": "first_fix"}, sensor=sensor))
+    drive = Drive(0)
+    samples = [drive.range_to(t / 10, 1) for t in range(5)] + [drive.sample(0.5, LocalPosition(0.0, 0.0))]
+    list(run(estimator, samples, 1))
+    assert {s.name: s.refused for s in estimator.sensors(SECOND)}["range/l/1"] == {"before_start": 5}
+
+
+def test_memory_is_bounded_while_it_waits_for_a_fix() -> None:
+    """Ten minutes of gyro and wheels before any fix."""
+    estimator = Estimator(configuration(start={"mode": "first_fix"}, sensor=[{"kind": "position"}]))
+    drive = Drive(0)
+    for k in range(0, 600 * 20, 20):
+        estimator.ingest([s for j in range(20) for s in drive.controls((k + j) / 20)])
+        estimator.tick(round((k + 20) / 20 * SECOND), 0, 100)
+    controls = estimator._controls
+    assert len(controls._turn._times) < 200
+    assert len(controls._distance._times) < 200
+
+
+def test_beacons_without_number_do_not_fill_the_memory() -> None:
+    estimator = Estimator(configuration())
+    drive = Drive(0)
+    samples = [drive.sample(0.1 + k * 1e-4, Range(1000 + k, 3.0)) for k in range(2000)]
+    list(run(estimator, samples, 1))
+    statuses = {s.name: s for s in estimator.sensors(SECOND)}
+    assert len(statuses) == MOST_RECORDS + 1
+    assert statuses[OTHERS].refused["no_beacon"] == 2000 - MOST_RECORDS
+
+
+def test_a_reading_that_cannot_be_true_is_counted() -> None:
+    estimator = Estimator(configuration(origin=None))
+    drive = Drive(0)
+    readings = (
+        Range(1, math.nan),
+        Range(1, 3.0, math.inf),
+        Origin(math.nan, 0.0, 0.0),
+        Origin(9.0, 0.0, 0.0),
+    )
+    estimator.ingest([drive.sample(0.1, reading) for reading in readings])
+    assert estimator.drops == {"implausible": 4}
+    assert "range" in estimator.tick(SECOND, 0, 100).reason
 
 
 def test_readings_of_unknown_beacons_are_refused_with_a_reason() -> None:
