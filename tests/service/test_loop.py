@@ -170,7 +170,9 @@ def test_ticks_lie_on_their_deadlines(rig: Rig) -> None:
 
 
 def test_a_stall_skips_ticks_and_counts_them(rig: Rig) -> None:
-    """0.25 s of nothing at 100 Hz: at least 23 ticks are missed, none is run in a burst afterwards."""
+    """0.25 s of nothing at 100 Hz: at least 23 ticks are missed; those after it come a period apart, but for
+    the lateness of the first, which is less than a period.
+    """
     rig.run(5)
     rig.estimator.stall = 0.25
     rig.loop.ticks = 0
@@ -178,7 +180,7 @@ def test_a_stall_skips_ticks_and_counts_them(rig: Rig) -> None:
     assert rig.loop.missed_ticks >= 23
     times = [msgspec.json.decode(p, type=Estimate).monotonic_ns for p in of(rig.published(), "estimate")]
     assert rig.meters.durations.worst >= 0.25
-    assert np.diff(times[-15:]).min() > 0
+    assert (times[-1] - times[-15]) * 1e-9 > 13 / RATE - 1e-3
 
 
 def test_samples_of_all_links_are_taken(rig: Rig) -> None:
