@@ -36,6 +36,13 @@ class Truth:
         )
 
 
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
 def read_truth(path: Path) -> Truth:
     """Read a truth file: CSV with the columns ``time_s, north_m, east_m`` at least.
 
@@ -54,7 +61,7 @@ def read_truth(path: Path) -> Truth:
             )
         for row in reader:
             try:
-                rows.append((float(row["time_s"]), float(row["north_m"]), float(row["east_m"])))
+                rows.append((_number(row["time_s"]), _number(row["north_m"]), _number(row["east_m"])))
             except (TypeError, ValueError):
                 raise ValueError(
                     f"{path}, line {reader.line_num}: time_s, north_m and east_m must be numbers"

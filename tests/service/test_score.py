@@ -57,6 +57,7 @@ def test_nothing_to_compare_gives_no_figures() -> None:
     [
         ("time_s,north_m\n1,2\n", "missing: east_m"),
         ("time_s,north_m,east_m\n1,2,3\n1,x,3\n", "line 3"),
+        ("time_s,north_m,east_m\n1,2,3\n2,2,nan\n", "line 3"),
         ("time_s,north_m,east_m\n1,2,3\n", "at least two rows"),
         ("time_s,north_m,east_m\n2,2,3\n1,2,3\n", "backwards"),
     ],
