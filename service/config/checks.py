@@ -122,6 +122,18 @@ def _slow_states_of_ranges(raw: Table) -> Iterator[str]:
             yield f"{where}: scale and bias are estimated for ranges only, and this is {shown(kind)}"
 
 
+def _slow_states_only_once(raw: Table) -> Iterator[str]:
+    first: dict[str, int] = {}
+    for index, (place, sensor) in enumerate(entries(raw, "sensor"), 1):
+        wanted = sensor.get("estimate")
+        if sensor.get("kind") != "range" or not isinstance(wanted, list):
+            continue
+        for state in cast("list[object]", wanted):
+            if isinstance(state, str) and first.setdefault(state, index) != index:
+                where = place_in_words((*place, "estimate"), raw)
+                yield f"{where}: {shown(state)} is estimated with sensor {first[state]}; there is one of all ranges"
+
+
 def resolved(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return the file's content with the paths it names taken relative to the file's folder."""
     named = {key for _, key in FILES}
@@ -167,5 +179,6 @@ def across_sections(raw: Table) -> list[str]:
         *_budget_within_a_tick(raw),
         *_not_built(raw),
         *_slow_states_of_ranges(raw),
+        *_slow_states_only_once(raw),
         *_absent_files(raw),
     ]

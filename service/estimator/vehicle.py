@@ -75,12 +75,10 @@ class Vehicle:
             if settings.throttle_channel is None
             else Throttle(settings.throttle_channel, settings.throttle_speed),
         )
-        self.slow_states = [
-            RandomWalk(f"{sensor.kind}_{state}", SENSOR_WALK)
-            for sensor in configuration.sensor
-            for state in sensor.estimate
-            if state != "delay"
+        states = [
+            f"{s.kind}_{state}" for s in configuration.sensor for state in s.estimate if state != "delay"
         ]
+        self.slow_states = [RandomWalk(state, SENSOR_WALK) for state in dict.fromkeys(states)]
         self._height: KalmanFilter | None = None
 
     # --- on the plane -------------------------------------------------------------------------------------------

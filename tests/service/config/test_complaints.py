@@ -173,6 +173,11 @@ SINGLE = [
         [{"kind": "position", "estimate": ["bias"]}],
         'sensor 1 (position), estimate: scale and bias are estimated for ranges only, and this is "position"',
     ),
+    (
+        "sensor",
+        [{"kind": "range", "estimate": ["scale"]}, {"kind": "range", "estimate": ["bias", "scale"]}],
+        'sensor 2 (range), estimate: "scale" is estimated with sensor 1; there is one of all ranges',
+    ),
     ("moton", {}, 'moton: unknown key; did you mean "motion"?'),
     ("xyzzy", 1, "xyzzy: unknown key"),
 ]
