@@ -150,21 +150,20 @@ class Estimator:
             self._dropped["implausible"] += 1
 
     def _queue(self, sample: Sample) -> None:
-        """Have ``sample`` wait for the horizon, for every sensor that wants it."""
-        for sensor in self._sensors:
-            if sensor.wants(sample):
-                record = self._record(sensor.name(sample))
-                record.arrivals += 1
-                if implausible(sample.reading) is not None:
-                    self._dropped["implausible"] += 1
-                    record.refused["implausible"] += 1
-                    continue
-                self._heard.add(sensor.title)
-                reason = self._timeline.insert(
-                    Waiting(sensor, sample), sample.time - sensor.delay, sample.received
-                )
-                if reason is not None:
-                    record.refused[reason] += 1
+        """Have ``sample`` wait for the horizon; it is the first sensor's that wants it: twice it would count double."""
+        sensor = next((sensor for sensor in self._sensors if sensor.wants(sample)), None)
+        if sensor is None:
+            return
+        record = self._record(sensor.name(sample))
+        record.arrivals += 1
+        if implausible(sample.reading) is not None:
+            self._dropped["implausible"] += 1
+            record.refused["implausible"] += 1
+            return
+        self._heard.add(sensor.title)
+        reason = self._timeline.insert(Waiting(sensor, sample), sample.time - sensor.delay, sample.received)
+        if reason is not None:
+            record.refused[reason] += 1
 
     def _record(self, name: str) -> SensorRecord:
         if name not in self._records and len(self._records) >= MOST_RECORDS:

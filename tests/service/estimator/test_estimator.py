@@ -297,6 +297,15 @@ def test_one_fix_said_twice_is_one_fix() -> None:
     assert variance(("a", "b", "c", "d")) == pytest.approx(variance(("a",)), rel=0.15)
 
 
+def test_a_reading_counts_once_though_two_sensors_ask_for_it() -> None:
+    sensor = {"kind": "range", "sigma": 0.3}
+    once, twice = (
+        list(run(Estimator(configuration(sensor=sensors)), ranged_drive(3, 5), 5))[-1]
+        for sensors in ([sensor], [sensor | {"source": "S"}, sensor])
+    )
+    assert twice.position_covariance == once.position_covariance
+
+
 def test_the_height_is_no_surer_for_being_told_more_often() -> None:
     """A receiver's errors stay alike over a second: 20 fixes a second tell the height as well as two do."""
 
