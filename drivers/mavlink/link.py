@@ -60,6 +60,7 @@ class MavlinkLink:
         self._refused: Counter[str] = Counter()
         self._ignored = 0
         self._opened = 0
+        self._arrived = 0
         self._heard = 0
         self._heartbeat_due = 0
         self._duty_due = 0
@@ -89,7 +90,7 @@ class MavlinkLink:
         self._sequences.forget()
         self._requests.restart()
         self._opened += 1
-        self._heard = self._heartbeat_due = self._duty_due = 0
+        self._arrived = self._heard = self._heartbeat_due = self._duty_due = 0
         self._do_duties(time.monotonic_ns())
 
     def close(self) -> None:
@@ -115,6 +116,7 @@ class MavlinkLink:
         self._samples = []
         self._received = time.monotonic_ns()
         for piece in port.read():
+            self._arrived = self._received
             self._scanner.feed(piece, self._take, self._sequences.passed)
         return self._samples
 
@@ -144,8 +146,9 @@ class MavlinkLink:
             return "opening", ""
         if now - self._heard <= SILENT_AFTER:
             return "up", ""
-        if self._scanner.faults.total():
-            return "silent", f"{self._settings.url}: bytes arrive, but no message that is understood"
+        if now - self._arrived <= SILENT_AFTER:
+            wanted = "understood" if self._check is None else "signed with the key"
+            return "silent", f"{self._settings.url}: bytes arrive, but no message that is {wanted}"
         return "silent", f"{self._settings.url}: nothing arrives"
 
     def _take(self, frame: Frame) -> None:

@@ -245,6 +245,32 @@ def test_its_own_messages_sent_back_are_ignored(link: MavlinkLink, autopilot: Au
     assert link.report().messages == 1
 
 
+def test_noise_is_told_from_silence(
+    link: MavlinkLink, autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A damaged frame of long ago does not mean that bytes arrive now."""
+    autopilot.say(b"\xfd nonsense, a baud rate that is wrong")
+    until(link, lambda: bool(link.report().malformed))
+    assert "bytes arrive, but no message that is understood" in link.report().reason
+    monkeypatch.setattr("drivers.mavlink.link.SILENT_AFTER", 1_000_000)
+    until(link, lambda: "nothing arrives" in link.report().reason)
+    assert link.report().malformed
+
+
+def test_messages_without_a_signature_are_no_silence(tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_bytes(bytes(32))
+    link = MavlinkLink("autopilot", MavlinkSettings(url="udpin:127.0.0.1:0", signing_key_file=str(key)))
+    link.open()
+    autopilot = autopilot_of(link)
+    autopilot.say(heartbeat())
+    until(link, lambda: link.report().malformed == {"unsigned": 1})
+    autopilot.socket.close()
+    assert link.report().state == "silent"
+    assert "bytes arrive, but no message that is signed with the key" in link.report().reason
+    link.close()
+
+
 def test_silence_is_said() -> None:
     link: Link = MavlinkLink("autopilot", MavlinkSettings(url="udpin:127.0.0.1:0"))
     assert link.report().state == "opening"
