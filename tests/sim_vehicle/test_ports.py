@@ -121,6 +121,30 @@ def test_a_url_of_another_kind_is_refused(url: str) -> None:
         open_mavlink(url)
 
 
+class Down(can.BusABC):
+    """A bus whose interface has been taken down."""
+
+    def __init__(self, channel: str, **_settings: object) -> None:
+        super().__init__(channel)
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise can.CanOperationError("Failed to transmit: Network is down", 100)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        raise can.CanOperationError("Error receiving: Network is down", 100)
+
+
+def test_a_bus_that_goes_down_while_driving_is_no_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The frames that nobody takes are counted, and said when the drive is over."""
+    monkeypatch.setitem(can.interfaces.BACKENDS, "socketcan", (__name__, "Down"))
+    port = open_can("socketcan:vcan0")
+    for _ in range(3):
+        port.serve()
+        port.send(CanFrame(0x18042F7B, b"1234567"))
+    assert (port.dropped, port.received) == (3, 0)
+    port.close()
+
+
 def test_a_taken_port_is_refused() -> None:
     with (
         opened("udpin:127.0.0.1:0") as (_, number),
