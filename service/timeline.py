@@ -73,7 +73,3 @@ class Timeline(Generic[Item]):
             time, _, item = heapq.heappop(self._waiting)
             passed.append((time, item))
         return passed
-
-    def clear(self) -> None:
-        """Forget what waits (a new start); the horizon and the counts stay."""
-        self._waiting.clear()
