@@ -29,10 +29,11 @@ from service.estimator.binding import (
     SensorRecord,
     position_of,
 )
-from service.estimator.controls import SECOND, Controls
+from service.estimator.controls import Controls
 from service.estimator.output import Output
 from service.estimator.start import Anchor, draw
 from service.estimator.stopwatch import Silent, Stopwatch
+from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 from service.geodesy import Geodetic, LocalFrame
 from service.health import Facts, HealthMonitor

@@ -18,8 +18,9 @@ from filters.motion.slow import RandomWalk
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from service.config import Configuration
-from service.estimator.controls import SECOND, SPEED_WINDOW, Controls, Throttle
+from service.estimator.controls import Controls, Throttle
 from service.estimator.start import Anchor
+from service.estimator.track import SECOND, SPEED_WINDOW
 from service.geodesy import LocalFrame
 
 UNKNOWN_SPEED = 2.0
