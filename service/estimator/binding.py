@@ -8,8 +8,6 @@ origin yet, no such beacon) is refused with a reason, and the reason is counted.
 from __future__ import annotations
 
 import math
-from collections import Counter
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from drivers.sample import (
@@ -113,17 +111,6 @@ class Refusal(NamedTuple):
 
     name: str
     reason: str
-
-
-@dataclass
-class SensorRecord:
-    """What became of one sensor's readings."""
-
-    accepted: int = 0
-    refused: Counter[str] = field(default_factory=Counter[str])
-    innovation: float | None = None
-    last: int | None = None
-    arrivals: int = 0
 
 
 class BoundSensor:

@@ -26,11 +26,11 @@ from service.estimator.binding import (
     Measurement,
     Place,
     Refusal,
-    SensorRecord,
     position_of,
 )
 from service.estimator.controls import Controls
 from service.estimator.output import Output
+from service.estimator.records import SensorRecord, SensorRecords
 from service.estimator.start import Anchor, draw
 from service.estimator.stopwatch import Silent, Stopwatch
 from service.estimator.track import SECOND
@@ -61,11 +61,6 @@ START_COUNT = 10_000
 DEMAND_INTERVAL = SECOND // 5
 GROWTH = 1.25
 """The set grows between resamplings only if the demand is this much larger than the count."""
-
-
-MOST_RECORDS = 256
-OTHERS = "others"
-"""Beacons' numbers come from outside: beyond this many names their readings are recorded under one."""
 
 
 class Waiting(NamedTuple):
@@ -115,7 +110,7 @@ class Estimator:
             maximum=configuration.budget.particles_max,
         )
         self._timeline: Timeline[Waiting] = Timeline()
-        self._records: dict[str, SensorRecord] = {}
+        self._records = SensorRecords()
         self._heard: set[str] = set()
         self._dropped: Counter[str] = Counter()
         self._frame = self._configured_frame()
@@ -124,7 +119,6 @@ class Estimator:
         self._demand = configuration.budget.particles_min
         self._demand_time = -(2**62)
         self._sequence = 0
-        self._last_status: int | None = None
 
     # --- samples in ---------------------------------------------------------------------------------------------
 
@@ -155,7 +149,7 @@ class Estimator:
         sensor = next((sensor for sensor in self._sensors if sensor.wants(sample)), None)
         if sensor is None:
             return
-        record = self._record(sensor.name(sample))
+        record = self._records.of(sensor.name(sample))
         record.arrivals += 1
         if implausible(sample.reading) is not None:
             self._dropped["implausible"] += 1
@@ -165,11 +159,6 @@ class Estimator:
         reason = self._timeline.insert(Waiting(sensor, sample), sample.time - sensor.delay, sample.received)
         if reason is not None:
             record.refused[reason] += 1
-
-    def _record(self, name: str) -> SensorRecord:
-        if name not in self._records and len(self._records) >= MOST_RECORDS:
-            name = OTHERS
-        return self._records.setdefault(name, SensorRecord())
 
     def _configured_frame(self) -> LocalFrame | None:
         origin = self.configuration.origin
@@ -239,7 +228,7 @@ class Estimator:
         """Weigh the particles by one measurement (line 5 of Table 4.3) and note what it said of the belief."""
         place = Place(time, self._frame, self._vehicle.down, self._controls)
         measured = waiting.sensor.measure(waiting.sample, place)
-        record = self._record(measured.name)
+        record = self._records.of(measured.name)
         if isinstance(measured, Refusal):
             record.refused[measured.reason] += 1
             return
@@ -294,7 +283,7 @@ class Estimator:
         return fresh
 
     def _refuse(self, waiting: Waiting, reason: str) -> None:
-        self._record(waiting.sensor.name(waiting.sample)).refused[reason] += 1
+        self._records.of(waiting.sensor.name(waiting.sample)).refused[reason] += 1
 
     def _try_start(
         self, horizon: int, passed: list[tuple[int, Waiting]], afforded: int
@@ -399,23 +388,7 @@ class Estimator:
 
     def sensors(self, now: int) -> list[SensorStatus]:
         """Return every sensor's status; rates are over the time since the last call."""
-        elapsed = SECOND if self._last_status is None else max(1, now - self._last_status)
-        self._last_status = now
-        statuses: list[SensorStatus] = []
-        for name, record in sorted(self._records.items()):
-            statuses.append(
-                SensorStatus(
-                    name,
-                    round(record.arrivals * SECOND / elapsed, 2),
-                    None,
-                    record.accepted,
-                    dict(record.refused),
-                    record.innovation,
-                    None if record.last is None else (now - record.last) / SECOND,
-                )
-            )
-            record.arrivals = 0
-        return statuses
+        return self._records.statuses(now)
 
     def cloud(self, count: int) -> NDArray[np.float32]:
         """Return a fair sub-sample of the particles at the last tick: north, east, heading, weight; (count, 4)."""

@@ -22,7 +22,7 @@ from drivers.sample import (
 from service.config import Configuration, validated
 from service.estimate import Estimate, HealthState
 from service.estimator import Estimator
-from service.estimator.estimator import MOST_RECORDS, OTHERS
+from service.estimator.records import MOST_RECORDS, OTHERS
 from service.geodesy import LocalFrame
 
 SECOND = 1_000_000_000
