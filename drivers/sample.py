@@ -243,8 +243,9 @@ class LinkReport(msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag=
         Messages that are well-formed but not wanted (other system, component or kind).
     dropped : int
         Samples that the loop's queue had no room for.
-    lost : int
-        Messages of the vehicle that never arrived, by the gaps in its senders' numbering (MAVLink).
+    lost : int or None
+        Messages of the vehicle that never arrived, by the gaps in its senders' numbering; ``None`` where
+        messages bear no numbers (CAN, Zenoh).
     offset, jitter : float or None
         Of the clock mapping, seconds: sensor clock to host clock, and the spread of arrival about it.
     """
@@ -258,7 +259,7 @@ class LinkReport(msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag=
     unusable: dict[str, int] = {}
     ignored: int = 0
     dropped: int = 0
-    lost: int = 0
+    lost: int | None = None
     opened: int = 0
     clock: str = ""
     offset: float | None = None

@@ -227,9 +227,9 @@ class LinkStatus(msgspec.Struct, frozen=True, gc=False):
         Messages that are well-formed but not wanted: another system, component or kind.
     dropped : int
         Samples that the loop's queue had no room for.
-    lost : int
+    lost : int or None
         Messages of the vehicle that never arrived whole, by the gaps in the numbering of their senders
-        (MAVLink). Numbers wrap at 256, so a long outage loses more.
+        (MAVLink); ``null`` where messages bear no numbers. Numbers wrap at 256, so a long outage loses more.
     clock : str
         How the sensor's clock is mapped to the host's: ``timesync``, ``envelope`` …
     offset, jitter : float or None
@@ -247,7 +247,7 @@ class LinkStatus(msgspec.Struct, frozen=True, gc=False):
     unusable: dict[str, int]
     ignored: int
     dropped: int
-    lost: int
+    lost: int | None
     clock: str
     offset: float | None
     jitter: float | None

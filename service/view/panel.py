@@ -241,7 +241,7 @@ def _link(known: Known, link: LinkStatus) -> tuple[Text, str, Text, str, str, st
         Text(link.state, style),
         str(refused),
         str(sum(link.unusable.values())),
-        str(link.lost),
+        "–" if link.lost is None else str(link.lost),
     )
 
 
