@@ -24,10 +24,14 @@ SILENCE = 3 * SECOND
 DISAGREEMENT = 0.8
 """Share of surprising measurements above which the belief is taken to be wrong, not the sensors."""
 
+AGREEMENT = 0.5
+"""Share below which a lost belief is believed again: between the two it stays what it was."""
+
 MEMORY = 3.0
-"""Seconds over which that share is averaged."""
+"""Seconds over which that share is averaged, once there are as many."""
 
 LEAST_READINGS = 10
+"""Fewer measurements than this prove nothing, neither for the belief nor against it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +79,10 @@ class HealthMonitor:
 
     def measured(self, now: int, kind: str, surprise: float) -> None:
         """Note one absolute measurement: ``surprise`` is the probability, 0…1, that it is the outlier part's."""
-        if self._last_reading is not None:
-            elapsed = max(0.0, (now - self._last_reading) / SECOND)
-            share = min(1.0, elapsed / MEMORY + 0.02)
-            self._surprise += share * (surprise - self._surprise)
         self._readings += 1
+        elapsed = 0.0 if self._last_reading is None else max(0.0, (now - self._last_reading) / SECOND)
+        share = min(1.0, max(1.0 / self._readings, elapsed / MEMORY + 0.02))
+        self._surprise += share * (surprise - self._surprise)
         self._last_reading = now
         self._last_kind = kind
 
@@ -107,12 +110,15 @@ class HealthMonitor:
         silent = self._silence(facts)
         if silent is not None:
             return HealthState.DEAD_RECKONING, silent
-        if self._readings >= LEAST_READINGS and self._surprise > DISAGREEMENT:
+        if self._readings < LEAST_READINGS:
+            return HealthState.CONVERGING, f"{self._readings} measurements so far, too few to tell"
+        limit = AGREEMENT if self.state is HealthState.LOST else DISAGREEMENT
+        if self._surprise > limit:
             return (
                 HealthState.LOST,
                 f"{self._surprise:.0%} of the measurements of the last {MEMORY:.0f} s disagree with the belief",
             )
-        return self._by_spread(radius)
+        return self._by_spread(radius, facts.missing)
 
     def _silence(self, facts: Facts) -> str | None:
         missing = f"; never heard: {', '.join(facts.missing)}" if facts.missing else ""
@@ -125,13 +131,17 @@ class HealthMonitor:
             )
         return None
 
-    def _by_spread(self, radius: float) -> tuple[HealthState, str]:
+    def _by_spread(self, radius: float, missing: list[str]) -> tuple[HealthState, str]:
         if self._placed and radius > LOST_RADIUS:
             self._placed = False
         if not self._placed and radius > CONVERGED_RADIUS:
             return HealthState.CONVERGING, f"95 % within {radius:.1f} m, above {CONVERGED_RADIUS:.0f} m"
         self._placed = True
-        return HealthState.TRACKING, "measurements agree with the belief"
+        agreeing = "measurements agree with the belief"
+        if self._surprise > 1.0 - DISAGREEMENT:
+            agreeing = f"{self._surprise:.0%} of the measurements of the last {MEMORY:.0f} s disagree with the belief"
+        unheard = f"; never heard: {', '.join(missing)}" if missing else ""
+        return HealthState.TRACKING, agreeing + unheard
 
 
 def _awaited(facts: Facts) -> str:

@@ -77,8 +77,11 @@ def highres_imu(fields: Any, at: Moment) -> list[Timed]:
 
 
 def raw_imu(fields: Any, at: Moment) -> list[Timed]:
-    """RAW_IMU 27: ArduPilot scales it like SCALED_IMU; from others it is counts of an unknown scale."""
-    if at.autopilot != ARDUPILOT:
+    """RAW_IMU 27: ArduPilot scales it like SCALED_IMU; from others it is counts of an unknown scale.
+
+    Until a heartbeat has said which autopilot it is, ArduPilot is taken for granted: nobody else is known to send it.
+    """
+    if at.autopilot not in (ARDUPILOT, None):
         at.pass_over("autopilot")
         return []
     if fields.id != 0:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import Annotated
 
 import typer
 
-from service.cli.failure import leave
+from service.cli.failure import DONE
 
 NAME = "listen"
 EPILOG = """
@@ -31,4 +33,10 @@ def command(
     """Show what a daemon publishes."""
     from service.view import listen
 
-    leave(listen.run(vehicle, router))
+    try:
+        status = listen.run(vehicle, router)
+    except KeyboardInterrupt:
+        status = DONE
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)  # a thread of Zenoh that still receives would abort the interpreter's own way out

@@ -45,6 +45,14 @@ STRIDE = SECOND // 10
 TOGETHER = SECOND // 1000
 """Measurements within a millisecond are weighed at one time."""
 
+FEW = 8
+CROWD = 64
+"""Up to a few measurements per tick are weighed each at its own time; more of them share four times; of a crowd, every
+n-th is taken and the rest refused as ``thinned``: on time goes first (degradation level 2)."""
+
+OUTLIER = 0.5
+"""Probability of being the outlier part's from which a measurement counts as refused: it moved next to nothing."""
+
 RESAMPLE_BELOW = 0.5
 """Share of the particles: equation 4.36's effective sample size below it asks for resampling."""
 
@@ -119,6 +127,7 @@ class Estimator:
         self._demand = configuration.budget.particles_min
         self._demand_time = -(2**62)
         self._sequence = 0
+        self._thinning = False
 
     # --- samples in ---------------------------------------------------------------------------------------------
 
@@ -203,8 +212,10 @@ class Estimator:
     def _fuse(self, passed: list[tuple[int, Waiting]], afforded: int) -> None:
         assert self._belief_time is not None
         fused = False
+        passed = self._thinned(passed)
+        together = TOGETHER if len(passed) <= FEW else max(TOGETHER, (passed[-1][0] - passed[0][0]) // 4)
         for time, waiting in passed:
-            if fused and time - self._belief_time > TOGETHER:
+            if fused and time - self._belief_time > together:
                 self._resample_if_worn(afforded)
                 fused = False
             if not fused:
@@ -213,6 +224,17 @@ class Estimator:
             fused = True
         if fused:
             self._resample_if_worn(afforded)
+
+    def _thinned(self, passed: list[tuple[int, Waiting]]) -> list[tuple[int, Waiting]]:
+        """Take evenly spaced ones of a crowd of measurements, and refuse the rest."""
+        self._thinning = len(passed) > CROWD
+        if not self._thinning:
+            return passed
+        taken = {index * len(passed) // CROWD for index in range(CROWD)}
+        for index, (_, waiting) in enumerate(passed):
+            if index not in taken:
+                self._refuse(waiting, "thinned")
+        return [passed[index] for index in sorted(taken)]
 
     def _advance(self, time: int) -> None:
         """Predict the belief to ``time`` in strides (line 4 of Table 4.3)."""
@@ -244,7 +266,10 @@ class Estimator:
         surprise = measured.surprise(evidence.log_mean)
         record.innovation = evidence.innovation
         record.last = time
-        record.accepted += 1
+        if surprise > OUTLIER:
+            record.refused["outlier"] += 1
+        else:
+            record.accepted += 1
         if measured.absolute:
             self.health.measured(time, measured.name, surprise)
 
@@ -356,11 +381,14 @@ class Estimator:
             monotonic_ns=now,
             health=state,
             reason=self.health.reason,
-            level=int(afforded < self._demand) if pose else 0,
+            level=self._level(afforded) if pose else 0,
             demanded=self._demand,
             afforded=afforded,
             reset_counter=self.reset_counter,
         )
+
+    def _level(self, afforded: int) -> int:
+        return 2 if self._thinning else int(afforded < self._demand)
 
     @property
     def demand(self) -> int:
@@ -387,8 +415,12 @@ class Estimator:
         return {what: count for what, count in counts.items() if count}
 
     def sensors(self, now: int) -> list[SensorStatus]:
-        """Return every sensor's status; rates are over the time since the last call."""
-        return self._records.statuses(now)
+        """Return every sensor's status, heard or not; rates are over the time since the last call."""
+        silent = [s.title for s in self._sensors if s.title not in self._heard]
+        return [
+            *self._records.statuses(now),
+            *(SensorStatus(title, 0.0, None, 0, {}, None, None) for title in silent),
+        ]
 
     def cloud(self, count: int) -> NDArray[np.float32]:
         """Return a fair sub-sample of the particles at the last tick: north, east, heading, weight; (count, 4)."""

@@ -143,6 +143,27 @@ channel undrained: the default one holds 256 samples and then stalls everything 
 """
 
 
+_FOREIGN = f"""
+## Samples of others
+
+A link of kind `zenoh` takes what anyone puts under `{PREFIX}/<vehicle>/sample/<sensor>` (a UWB node, a DVL): one JSON
+object with the reading's `kind` and fields, **SI units and radians, latitude and longitude too**, and optionally
+`time`, Unix seconds; without it the time of arrival counts.
+
+```json
+{{"kind": "range", "beacon": 5, "distance": 12.3, "sigma": 0.3, "time": 1700000010.25}}
+{{"kind": "local_position", "north": 3.2, "east": -1.0, "sigma_horizontal": 0.2}}
+{{"kind": "geodetic_position", "latitude": 0.7058, "longitude": -1.3951, "sigma_horizontal": 1.5}}
+{{"kind": "velocity", "north": 1.2, "east": -0.4, "sigma": 0.05}}
+{{"kind": "heading", "heading": 1.57, "sigma": 0.05}}
+{{"kind": "speed", "speed": 1.1}}
+```
+
+`drivers/sample.py` has every kind, `drivers/foreign.py` what is refused. A field too many, a wrong type or a value
+that cannot be true refuses the sample; the count stands in `sensors`, `links`, `malformed`, under `sample/<sensor>`.
+A `time` more than a second ahead or a minute behind is refused too: the sender's clock is not set.
+"""
+
 SUBSCRIBER = """\
 import json
 
@@ -181,6 +202,7 @@ def _parts() -> Iterator[str]:
     yield _ASKING
     yield f"\n```python\n{SUBSCRIBER}```\n"
     yield _EXAMPLES
+    yield _FOREIGN
     for value in VALUES:
         yield from _value(value)
 

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
@@ -23,10 +24,10 @@ FIGURES = (
     ("rmse_m", "RMSE m", "{:.3f}"),
     ("p95_m", "95 % m", "{:.3f}"),
     ("max_m", "worst m", "{:.3f}"),
-    ("coverage_95", "inside 95 %", "{:.1%}"),
+    ("coverage_95", "in 95 %", "{:.1%}"),
     ("nees_mean", "NEES", "{:.2f}"),
-    ("final_m", "at the end m", "{:.3f}"),
-    ("particles_mean", "particles", "{:.0f}"),
+    ("final_m", "end m", "{:.3f}"),
+    ("particles_mean", "count", "{:.0f}"),
 )
 
 
@@ -81,24 +82,25 @@ def as_json(runs: list[Run]) -> str:
 
 def show(runs: list[Run], console: Console, title: str) -> None:
     """Print a table of the runs, what became of the samples, and the spread over the seeds."""
-    table = Table(title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1))
     table.add_column("seed", justify="right")
     for _, heading, _ in FIGURES:
         table.add_column(heading, justify="right")
-    table.add_column("x real time", justify="right")
-    table.add_column("health")
+    table.add_column("speed", justify="right")
     for run in runs:
         row = run.row()
         cells = [_figure(row.get(name), form) for name, _, form in FIGURES]
-        health = ", ".join(f"{state} {share:.0%}" for state, share in run.health.items())
-        table.add_row(str(run.seed), *cells, f"{run.real_time_factor:.0f}", health)
+        table.add_row(str(run.seed), *cells, f"x{run.real_time_factor:.0f}")
+    spread: dict[str, Any] = summary(runs)
     if len(runs) > 1:
-        spread: dict[str, Any] = summary(runs)
         table.add_section()
         for statistic in ("mean", "sd", "max"):
             cells = [_figure(spread.get(name, {}).get(statistic), form) for name, _, form in FIGURES]
-            table.add_row(statistic, *cells, "", "")
+            table.add_row(statistic, *cells, "")
     console.print(table)
+    health: dict[str, float] = spread["health"]
+    shares = ", ".join(f"{state} {share:.1%}" for state, share in health.items())
+    console.print(f"  health: {shares}", highlight=False)
     _show_details(runs[0], console)
 
 

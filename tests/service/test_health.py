@@ -92,11 +92,45 @@ def test_a_single_outlier_changes_nothing() -> None:
     assert monitor.judge(facts(now)) is HealthState.TRACKING
 
 
-def test_a_few_readings_do_not_make_it_lost() -> None:
+def test_a_few_readings_prove_nothing_either_way() -> None:
+    for surprise in (0.0, 1.0):
+        monitor = HealthMonitor()
+        for k in range(5):
+            monitor.measured(k * SECOND, "range/a/1", surprise)
+        assert monitor.judge(facts(4.1)) is HealthState.CONVERGING
+        assert "5 measurements" in monitor.reason
+
+
+def test_a_wrong_start_is_never_called_tracking() -> None:
+    """Measurements that disagree from the first on: converging while they are few, then lost, within a second."""
     monitor = HealthMonitor()
-    for k in range(5):
-        monitor.measured(k * SECOND, "range/a/1", 1.0)
-    assert monitor.judge(facts(4.1)) is HealthState.TRACKING
+    states: list[HealthState] = []
+    for k in range(30):
+        monitor.measured(round(k / 10 * SECOND), "range/a/1", 0.97)
+        states.append(monitor.judge(facts(k / 10)))
+    assert states[:9] == [HealthState.CONVERGING] * 9
+    assert states[9:] == [HealthState.LOST] * 21
+
+
+def test_between_agreeing_and_disagreeing_it_stays_what_it_was() -> None:
+    monitor = HealthMonitor()
+    now = agreeing(monitor, 0, 3)
+    now = agreeing(monitor, now, 20, surprise=0.65)
+    assert monitor.judge(facts(now)) is HealthState.TRACKING
+    assert "65% of the measurements" in monitor.reason
+    now = agreeing(monitor, now, 10, surprise=1.0)
+    assert monitor.judge(facts(now)) is HealthState.LOST
+    now = agreeing(monitor, now, 20, surprise=0.65)
+    assert monitor.judge(facts(now)) is HealthState.LOST
+    now = agreeing(monitor, now, 20)
+    assert monitor.judge(facts(now)) is HealthState.TRACKING
+
+
+def test_tracking_says_what_was_never_heard() -> None:
+    monitor = HealthMonitor()
+    now = agreeing(monitor, 0, 3)
+    assert monitor.judge(facts(now, missing=["yaw rate"])) is HealthState.TRACKING
+    assert "never heard: yaw rate" in monitor.reason
 
 
 def test_starves_when_the_budget_affords_too_few() -> None:
