@@ -24,9 +24,15 @@ def command(
     from rich.console import Console
 
     from service.cli import plan
-    from service.config import load
+    from service.config import ConfigurationError, load
+    from service.publish.session import SessionError, configuration_from_file
 
     read = load(configuration)
+    if read.publish.zenoh:
+        try:
+            configuration_from_file(read.publish.zenoh)
+        except SessionError as error:
+            raise ConfigurationError([f"{configuration.name}: {error}"]) from error
     console = Console(highlight=False)
     for table in plan.tables(read):
         console.print(table)

@@ -41,8 +41,8 @@ class Opened:
         return _bindable(self.hub)
 
 
-def open_from_file(path: str) -> Opened:
-    """Open a session as a JSON5 file says.
+def configuration_from_file(path: str) -> zenoh.Config:
+    """Return what a JSON5 file says.
 
     The file is taken as it is but for one thing: time stamps are switched on unless it says otherwise,
     because the history of ``health`` needs them.
@@ -50,7 +50,7 @@ def open_from_file(path: str) -> Opened:
     Raises
     ------
     SessionError
-        The file cannot be read, is no Zenoh configuration, or its endpoints cannot be had.
+        The file cannot be read, or is no Zenoh configuration.
     """
     if not Path(path).is_file():
         raise SessionError(
@@ -62,6 +62,18 @@ def open_from_file(path: str) -> Opened:
             configuration.insert_json5("timestamping/enabled", "true")
     except zenoh.ZError as error:
         raise SessionError(f"publish.zenoh: {path}: {plain(error)}") from error
+    return configuration
+
+
+def open_from_file(path: str) -> Opened:
+    """Open a session as a JSON5 file says.
+
+    Raises
+    ------
+    SessionError
+        The file cannot be read, is no Zenoh configuration, or its endpoints cannot be had.
+    """
+    configuration = configuration_from_file(path)
     try:
         return Opened(zenoh.open(configuration), f"as {path} says")
     except zenoh.ZError as error:

@@ -103,6 +103,17 @@ def test_check_prints_what_would_run(configuration: Path) -> None:
     assert done.stdout.endswith("robot.toml: usable\n")
 
 
+@pytest.mark.parametrize("content", ["{mode: ", '{modus: "peer"}'])
+def test_check_reads_the_zenoh_file_that_is_named(configuration: Path, content: str) -> None:
+    configuration.with_name("zenoh.json5").write_text(content)
+    configuration.write_text(LEAST + '[publish]\nzenoh = "zenoh.json5"\n')
+    done = beliefd("check", configuration)
+    assert done.returncode == 2
+    assert "publish.zenoh" in done.stderr
+    configuration.with_name("zenoh.json5").write_text('{mode: "peer"}')
+    assert beliefd("check", configuration).returncode == 0
+
+
 def test_check_shows_links_sensors_and_limits_of_the_example() -> None:
     done = beliefd("check", "beliefd.example.toml")
     assert done.returncode == 0
