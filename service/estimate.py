@@ -191,7 +191,7 @@ class SensorStatus(msgspec.Struct, frozen=True, gc=False):
     accepted : int
         Readings used so far.
     refused : dict[str, int]
-        Readings not used, by reason: ``late``, ``future``, ``invalid``, ``no_beacon``, ``outlier`` …
+        Readings not used, by reason: ``late``, ``future``, ``invalid``, ``no_beacon``, ``outlier``, ``thinned`` …
     innovation : float or None
         The last one, measured minus expected, in the sensor's own unit (m, m/s, rad).
     age : float or None
