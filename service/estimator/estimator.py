@@ -63,6 +63,9 @@ HEADING_BIN = 0.1
 KLD_ERROR = 0.01
 """Nats. The bins count the pose only; the slow states beside it want several particles in each of its bins."""
 
+STALE = 5 * SECOND
+"""How far behind the horizon a starting measurement may lie: a slow computer is late, a minute in a queue is stale."""
+
 START_COUNT = 10_000
 """Particles of a start about a known place; one over an area takes all that can be afforded."""
 
@@ -301,7 +304,7 @@ class Estimator:
 
     def _fresh(self, horizon: int, passed: list[tuple[int, Waiting]]) -> list[tuple[int, Waiting]]:
         """Refuse what is older than a start may lie back: it waited in a queue while nobody ran."""
-        fresh = [(time, waiting) for time, waiting in passed if time >= horizon - SECOND]
+        fresh = [(time, waiting) for time, waiting in passed if time >= horizon - STALE]
         for _, waiting in passed[: len(passed) - len(fresh)]:
             self._refuse(waiting, "late")
             self._dropped["late"] += 1

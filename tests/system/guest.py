@@ -19,7 +19,20 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from checks import SERVICE, Estimates, Tally, expect, journal, must, processes, run, status_of, unit, until
+from checks import (
+    SERVICE,
+    CheckError,
+    Estimates,
+    Tally,
+    expect,
+    journal,
+    must,
+    processes,
+    run,
+    status_of,
+    unit,
+    until,
+)
 
 BELIEFD = "/opt/venv/bin/beliefd"
 PYTHON = "/opt/venv/bin/python"
@@ -164,6 +177,16 @@ def confinement(tally: Tally) -> None:
         facts.append(f"all, shared pages once: {int(unit('MemoryCurrent')) // 2**20} MiB")
 
 
+def first_position(estimates: Estimates, vehicle: Vehicle, since: float) -> Any:
+    """Wait for a position; where the guest was too slow for the satellites' 20 s, the vehicle drives again."""
+    for _ in range(3):
+        try:
+            return until(lambda: estimates.located_after(since), "a first position", 40.0)
+        except CheckError:
+            vehicle.again()
+    return until(lambda: estimates.located_after(since), "a first position")
+
+
 def estimating(tally: Tally, estimates: Estimates) -> Vehicle:
     with tally.check("before any frame it publishes, and waits") as facts:
         newest = until(lambda: estimates.after(time.monotonic() - 1), "an estimate")
@@ -173,7 +196,7 @@ def estimating(tally: Tally, estimates: Estimates) -> Vehicle:
     vehicle = Vehicle()
     with tally.check("frames on vcan0 give a position") as facts:
         until(lambda: estimates.link("bus").get("messages", 0) > 0, "frames on the bus")
-        first = until(lambda: estimates.located_after(started), "a first position")
+        first = first_position(estimates, vehicle, started)
         expect(any(value["links"] for value in estimates.states), "no word on the links")
         facts.append(f"{estimates.arrived[-1][0] - started:.1f} s after the simulator's start")
         facts.append(f"{error_of(first, vehicle):.2f} m off")
@@ -244,7 +267,7 @@ def located_again(estimates: Estimates, vehicle: Vehicle, since: float) -> str:
     until(lambda: estimates.counts_anew(since), "an estimate of the new loop")
     gap = estimates.gap(since)
     vehicle.again()
-    until(lambda: estimates.located_after(time.monotonic() - 0.5), "a position of the new loop")
+    first_position(estimates, vehicle, time.monotonic())
     return f"longest time without an estimate {gap:.2f} s"
 
 
