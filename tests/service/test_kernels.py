@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib.util import spec_from_file_location
 from pathlib import Path
 
 import pytest
@@ -68,22 +69,45 @@ def test_preparing_imports_no_kernel(tmp_path: Path) -> None:
     assert done.stdout.splitlines()[1] == "False False"
 
 
-def test_the_digest_follows_the_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "filters").mkdir()
-    source = tmp_path / "filters" / "__init__.py"
-    monkeypatch.setattr(kernels, "_sources", lambda: [source])
-    digests: set[str] = set()
-    for text in ("a = 1", "a = 2", "a = 1 "):
-        source.write_text(text)
-        digests.add(kernels.digest())
-    assert len(digests) == 3
-    source.write_text("a = 1")
-    assert kernels.digest() in digests
+def of(folder: Path, monkeypatch: pytest.MonkeyPatch, **sources: str) -> str:
+    """Return the digest of a package ``filters`` of these modules."""
+    package = folder / "filters"
+    package.mkdir(exist_ok=True)
+    (package / "__init__.py").touch()
+    for name, text in sources.items():
+        (package / f"{name}.py").write_text(text)
+    monkeypatch.setattr(
+        kernels, "find_spec", lambda name: spec_from_file_location(name, package / "__init__.py")
+    )
+    return kernels.digest()
+
+
+KERNEL = "from filters.shared import (\n    LIMIT,\n)\n@kernel('f4(f4)')\ndef k(x): return x + LIMIT\n"
+
+
+def test_the_digest_follows_the_kernels_and_what_they_import(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = of(tmp_path, monkeypatch, a=KERNEL, shared="from filters import deep", deep="LIMIT = 1", free="")
+    others = {
+        of(tmp_path, monkeypatch, a=KERNEL + " "),
+        of(tmp_path, monkeypatch, shared="from filters import deep  # 2"),
+        of(tmp_path, monkeypatch, deep="LIMIT = 2"),
+    }
+    assert len(others | {first}) == 4
+    back = of(tmp_path, monkeypatch, a=KERNEL, shared="from filters import deep", deep="LIMIT = 1")
+    assert back == first
+
+
+def test_a_filter_that_holds_no_kernel_may_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert of(tmp_path, monkeypatch, a=KERNEL, free="x = 1") == of(tmp_path, monkeypatch, free="x = 2")
 
 
 def test_the_digest_is_of_this_tree() -> None:
     assert re.fullmatch(r"[0-9a-f]{12}", kernels.digest())
-    assert ROOT / "filters" / "__init__.py" in kernels._sources()
+    sources = kernels._sources()
+    assert {"kernels/elementary.py", "kernels/compile.py", "motion/unicycle.py"} <= set(sources)
+    assert sources["kernels/random.py"] == (ROOT / "filters" / "kernels" / "random.py").read_bytes()
 
 
 def test_a_cache_of_an_older_version_goes_in_the_end(tmp_path: Path) -> None:
