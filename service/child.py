@@ -1,8 +1,8 @@
 """One process under supervision: started, listened to, ended, and started again with back-off.
 
-A child that has a heart must beat: within ``start_patience`` of its start (or of its last announcement), and
-from then on never further apart than ``patience``. One that has none is taken at its word as long as it
-lives.
+A child that has a heart must beat: within ``start_patience`` of its start (or of its last announcement; twice
+that after a start that took longer), and from then on never further apart than ``patience``. One that has none
+is taken at its word as long as it lives.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ from service.estimate import ProcessStatus
 
 TERMINATION = 1.5
 """Seconds that a process is given to end by itself after SIGTERM."""
+
+MOST_DOUBLINGS = 4
+"""Up to 16 times the patience, for computers on which a start takes minutes."""
 
 _NO_STANDARD_OUTPUT = 2
 
@@ -74,6 +77,7 @@ class Child:
         self.restarts = 0
         self.failed_starts = 0
         """Lives in a row that ended before the first beat."""
+        self._slow_starts = 0
         self.due = 0.0
         """When something is to be done about it next: start it, or end it."""
         self._process: subprocess.Popen[bytes] | None = None
@@ -97,6 +101,15 @@ class Child:
         """Number of the process under way."""
         return self._process.pid if self._process else None
 
+    @property
+    def start_patience(self) -> float:
+        """Seconds within which the life under way must beat first.
+
+        They double whenever a start was ended for being slow: ended again at the same age on a slow
+        computer, it would never run, and would only take from the others.
+        """
+        return self.program.start_patience * 2 ** min(self._slow_starts, MOST_DOUBLINGS)
+
     def start(self, now: float) -> int:
         """Start a process, and return a descriptor that becomes readable when it ends (pidfd)."""
         program = self.program
@@ -115,7 +128,7 @@ class Child:
         self._accused = ""
         self._healthy_since = None if program.heart else now
         self.state = "starting" if program.heart else "running"
-        self.due = now + program.start_patience if program.heart else float("inf")
+        self.due = now + self.start_patience if program.heart else float("inf")
         return os.pidfd_open(self._process.pid)
 
     def listen(self, now: float) -> str | None:
@@ -130,7 +143,7 @@ class Child:
             if self.state not in ("starting", "running"):
                 continue
             if announced is not None:
-                self.due = now + self.program.start_patience
+                self.due = now + self.start_patience
             else:
                 self._beat(now)
         return announced
@@ -139,7 +152,7 @@ class Child:
         self.due = now + self.program.patience
         if self.state == "starting":
             self.state = "running"
-            self.failed_starts = 0
+            self.failed_starts = self._slow_starts = 0
             self._healthy_since = now
 
     def hung(self, now: float, why: str) -> None:
@@ -181,6 +194,7 @@ class Child:
             return how
         if self.state == "starting":
             self.failed_starts += 1
+            self._slow_starts += bool(self._accused)
         lived = 0.0 if self._healthy_since is None else now - self._healthy_since
         self.state = "waiting"
         self.reason = self._accused or how

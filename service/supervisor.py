@@ -189,7 +189,7 @@ class Supervisor:
             _log.warning("%s: did not end within its time, killed", name)
             child.kill()
         else:
-            patience = child.program.patience if child.state == "running" else child.program.start_patience
+            patience = child.program.patience if child.state == "running" else child.start_patience
             _log.warning("%s: no sign of life for %g s, killed", name, patience)
             child.hung(now, f"hung: no sign of life for {patience:g} s")
         self._status_due = now
@@ -207,10 +207,10 @@ class Supervisor:
         if child.program.heart is not None:
             self._selector.register(child.program.heart, selectors.EVENT_READ, child)
         if child.program.vital and self._notifier.watchdog_period:
-            self._notifier.watchdog_within(child.program.start_patience)
+            self._notifier.watchdog_within(child.start_patience)
         if name == self._plan.publisher:
             # the queue may be full already, or fill, before it has started and reads
-            self._patient_until = now + child.program.start_patience
+            self._patient_until = now + child.start_patience
             self._plan.call()
 
     def _listen(self, child: Child) -> None:

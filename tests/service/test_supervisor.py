@@ -210,6 +210,8 @@ def test_one_that_never_beats_is_given_its_start_time_only(start: Start) -> None
     service = start(PUBLISHER, LOOP, LINK | {"manner": "mute", "start_patience": 0.3})
     after = service.wait(lambda last: "link bus" in last and last["link bus"].restarts >= 1)
     assert after["link bus"].reason == "hung: no sign of life for 0.3 s"
+    after = service.wait(lambda last: last["link bus"].restarts >= 2)
+    assert after["link bus"].reason == "hung: no sign of life for 0.6 s", "a slow computer is given more time"
 
 
 def test_the_watchdog_is_fed_only_while_ticks_arrive(start: Start) -> None:
