@@ -29,6 +29,8 @@ LOOP_START = 180.0
 """Seconds until the first tick: on a slow computer without a cache the kernels are compiled first."""
 
 LOOP_PATIENCE = 1.0
+LOOP_PATIENCE_TICKS = 20
+"""A loop with a low rate is one on a slow computer, which may be held up for longer."""
 LINK_PATIENCE = 5.0
 LINK_START = 30.0
 
@@ -108,7 +110,7 @@ class Wiring:
             (self._file, heart.outlet.fileno(), outlet, *ends),
             self._configuration.model_dump_json(exclude={"state"}),
             heart.inlet,
-            max(LOOP_PATIENCE, 3.0 / self._configuration.loop.rate),
+            max(LOOP_PATIENCE, LOOP_PATIENCE_TICKS / self._configuration.loop.rate),
             LOOP_START,
             vital=True,
             environment=_single_threaded(self._configuration.budget.threads),

@@ -20,10 +20,12 @@ from typing import Any
 import zenoh
 
 SERVICE = "beliefd.service"
-PATIENCE = 60.0
-"""Seconds for what starts a process or two: the guest has one processor and slow system calls."""
+PATIENCE = 120.0
+"""Seconds for what starts a process or two: the guest has one processor, and its page faults and system calls cost
+up to a hundred times what they cost elsewhere."""
 
-_POLL = 0.05
+_POLL = 0.25
+_GROUP = Path("/sys/fs/cgroup/system.slice", SERVICE, "cgroup.procs")
 
 
 class CheckError(AssertionError):
@@ -65,12 +67,12 @@ class Tally:
         return 1 if self.failed or not self.passed else 0
 
 
-def run(*command: str, timeout: float = 60.0) -> subprocess.CompletedProcess[str]:
+def run(*command: str, timeout: float = PATIENCE) -> subprocess.CompletedProcess[str]:
     """Run a program to its end; its status is the caller's to judge."""
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
 
 
-def must(*command: str, timeout: float = 60.0) -> str:
+def must(*command: str, timeout: float = PATIENCE) -> str:
     """Run a program that has to succeed; return what it printed."""
     done = run(*command, timeout=timeout)
     if done.returncode != 0:
@@ -104,8 +106,7 @@ def unit(name: str) -> str:
 def processes() -> dict[str, int]:
     """Return the service's processes: supervisor, loop, publisher, link NAME, each with its number."""
     found: dict[str, int] = {}
-    group = Path("/sys/fs/cgroup", unit("ControlGroup").lstrip("/"), "cgroup.procs")
-    for line in group.read_text().split() if group.exists() else []:
+    for line in _GROUP.read_text().split() if _GROUP.exists() else []:
         try:
             words = Path(f"/proc/{line}/cmdline").read_bytes().decode().split("\0")
         except OSError:

@@ -65,7 +65,6 @@ def install_wheel() -> None:
         "--no-deps",
         "--no-index",
         str(wheel),
-        timeout=120,
     )
 
 
@@ -78,7 +77,7 @@ def write_configuration() -> None:
     )  # fmt: skip
     tables = re.split(r"\n(?=\[)", ROBOT.read_text())
     tables = ['[start]\nmode = "first_fix"\n' if table.startswith("[start]") else table for table in tables]
-    loop = f"[loop]\nrate = 25.0\npriority = {PRIORITY}\n[budget]\nparticles_max = 20_000\n"
+    loop = f"[loop]\nrate = 5.0\npriority = {PRIORITY}\n[budget]\nparticles_max = 20_000\n"
     ROBOT.write_text("\n".join([*tables, loop]))
 
 
@@ -119,10 +118,12 @@ def error_of(estimate: dict[str, Any], vehicle: Vehicle) -> float:
 
 def replaced(name: str, before: dict[str, int]) -> int:
     """Wait until a process of the service has another number than before; return it."""
-    return until(
-        lambda: processes().get(name) if processes().get(name) not in (None, before[name]) else None,
-        f"another {name}",
-    )
+
+    def another() -> int | None:
+        number = processes().get(name)
+        return None if number == before[name] else number
+
+    return until(another, f"another {name}")
 
 
 def installation(tally: Tally) -> None:
@@ -139,7 +140,7 @@ def installation(tally: Tally) -> None:
         expect(done.returncode == 2 and 'did you mean "can"?' in done.stderr, done)
         expect(not Path("/etc/systemd/system", SERVICE).exists(), "there is a unit")
     with tally.check("beliefd service install: it becomes ready") as facts:
-        facts.extend(must(BELIEFD, "service", "install", str(ROBOT), timeout=240).splitlines()[-1:])
+        facts.extend(must(BELIEFD, "service", "install", str(ROBOT), timeout=480).splitlines()[-1:])
         expect(
             (unit("ActiveState"), unit("SubState"), unit("Type")) == ("active", "running", "notify"),
             unit("Result"),
@@ -220,7 +221,7 @@ def estimating(tally: Tally, estimates: Estimates) -> Vehicle:
             f"{end['particles']} particles",
         ]
     with tally.check("beliefd service status shows it") as facts:
-        said = must(BELIEFD, "service", "status", timeout=30)
+        said = must(BELIEFD, "service", "status")
         expect("link bus" in said and "active" in said, said)
     return vehicle
 

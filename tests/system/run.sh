@@ -45,6 +45,6 @@ cp "$work"/wheels/*.whl "$here"/guest.py "$here"/checks.py "$work/project/"
 say "boot"
 [ $# -gt 0 ] || set -- /opt/venv/bin/python guest.py
 status=0
-bash "$here/vm/run_vm.sh" "$image" -p "$work/project" -o "$results" -t 600 -m 1536 -- "$@" || status=$?
+bash "$here/vm/run_vm.sh" "$image" -p "$work/project" -o "$results" -t 1200 -m 1536 -- "$@" || status=$?
 say "exit $status; journal and console in ${results#"$root"/}"
 exit $status
