@@ -1,17 +1,24 @@
 """The Kalman filter: the exact belief where everything is linear and Gaussian.
 
 Prediction and correction as in Table 3.1 of *Probabilistic Robotics*, with Joseph's form of the covariance,
-which stays symmetric and positive whatever the rounding of the gain.
+which stays symmetric and positive whatever the rounding of the gain. The same correction serves the extended
+Kalman filter (:mod:`filters.extended_kalman`), which brings an innovation and a Jacobian of its own.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from filters import chi_square
+
 Matrix = NDArray[np.float64]
+
+_LOG_TWO_PI = math.log(2.0 * math.pi)
 
 
 class Correction(NamedTuple):
@@ -20,16 +27,53 @@ class Correction(NamedTuple):
     Attributes
     ----------
     innovation : (measured,) float64
-        Measured minus expected.
+        Measured minus expected, of the components that were measured; angles in [-pi, pi].
     innovation_covariance : (measured, measured) float64
         What was to be expected of it.
     nis : float
         Normalised innovation squared: chi-square with ``measured`` degrees of freedom if the model is right.
+    log_evidence : float
+        Logarithm of the density that the belief gave to the measurement; 0 where nothing was measured.
+    accepted : bool
+        False if the gate kept it out; the belief is unchanged then.
     """
 
     innovation: Matrix
     innovation_covariance: Matrix
     nis: float
+    log_evidence: float
+    accepted: bool
+
+
+class Gaussian(NamedTuple):
+    """A mean, (n,), and a covariance, (n, n)."""
+
+    mean: Matrix
+    covariance: Matrix
+
+
+class Expectation(NamedTuple):
+    """What was measured, beside what a state leads to expect.
+
+    Attributes
+    ----------
+    measured : (m,) float64
+        z; NaN among its components means that this one was not measured.
+    expected : (m,) float64
+        C x, or h(x).
+    jacobian : (m, n) float64
+        H: C itself, or the derivative of h at x.
+    noise : (m, m) float64
+        Q, the covariance of the measurement's noise.
+    angles : tuple of int
+        Components that are angles: their innovation is taken in [-pi, pi].
+    """
+
+    measured: Matrix
+    expected: Matrix
+    jacobian: Matrix
+    noise: Matrix
+    angles: tuple[int, ...] = ()
 
 
 class KalmanFilter:
@@ -41,23 +85,22 @@ class KalmanFilter:
         Of the state.
     covariance : (n, n) array
         Symmetric, positive semi-definite.
+    angles : sequence of int, optional
+        Components of the state that are angles, radians: they are kept in [-pi, pi].
 
     Raises
     ------
     ValueError
-        Shapes that do not fit, or numbers that are not finite.
+        Shapes that do not fit, numbers that are not finite, a covariance that is not symmetric or has a
+        negative variance.
     """
 
-    def __init__(self, mean: ArrayLike, covariance: ArrayLike) -> None:
-        self.mean: Matrix = np.array(mean, np.float64, ndmin=1)
-        self.covariance: Matrix = np.array(covariance, np.float64, ndmin=2)
-        size = self.mean.size
-        if self.mean.shape != (size,) or self.covariance.shape != (size, size):
-            raise ValueError(
-                f"Kalman filter: mean (n,) and covariance (n, n) are needed, got {self.mean.shape} and "
-                f"{self.covariance.shape}"
-            )
-        _require_finite("Kalman filter", self.mean, self.covariance)
+    def __init__(self, mean: ArrayLike, covariance: ArrayLike, angles: Sequence[int] = ()) -> None:
+        self.mean: Matrix
+        self.covariance: Matrix
+        self.mean, self.covariance = checked_gaussian("Kalman filter", mean, covariance)
+        self.angles = checked_angles("Kalman filter", angles, self.mean.size)
+        wrap(self.mean, self.angles)
 
     def predict(
         self,
@@ -75,23 +118,40 @@ class KalmanFilter:
         noise : (n, n) array
             R, the covariance of the motion's noise over this prediction.
         control_gain, control : (n, m) and (m,) array, optional
-            B and u.
+            B and u; both or neither.
 
         Raises
         ------
         ValueError
-            Numbers that are not finite; the belief is unchanged then.
+            Shapes that do not fit, numbers that are not finite, a control without a gain; the belief is
+            unchanged then.
         """
+        size = self.mean.size
         matrix = _matrix(transition)
         spread = _matrix(noise)
+        require_shape("Kalman prediction: transition", matrix, (size, size))
+        require_shape("Kalman prediction: noise", spread, (size, size))
         mean = matrix @ self.mean
+        if (control_gain is None) != (control is None):
+            raise ValueError("Kalman prediction: control_gain and control are needed together, got only one")
         if control_gain is not None and control is not None:
-            mean = mean + _matrix(control_gain) @ np.array(control, np.float64, ndmin=1)
-        covariance = matrix @ self.covariance @ matrix.T + spread
-        _require_finite("Kalman prediction", mean, covariance)
+            command = np.array(control, np.float64, ndmin=1)
+            gain = _matrix(control_gain)
+            require_shape("Kalman prediction: control_gain", gain, (size, command.size))
+            mean = mean + gain @ command
+        covariance = symmetric(matrix @ self.covariance @ matrix.T + spread)
+        require_finite("Kalman prediction", mean, covariance)
+        wrap(mean, self.angles)
         self.mean, self.covariance = mean, covariance
 
-    def correct(self, measurement: ArrayLike, model: ArrayLike, noise: ArrayLike) -> Correction:
+    def correct(
+        self,
+        measurement: ArrayLike,
+        model: ArrayLike,
+        noise: ArrayLike,
+        angles: Sequence[int] = (),
+        gate: float | None = None,
+    ) -> Correction:
         """Weigh in a measurement z = C x + v; NaN among its components means that this one was not measured.
 
         Parameters
@@ -101,7 +161,11 @@ class KalmanFilter:
         model : (m, n) array
             C.
         noise : (m, m) array
-            Q, the covariance of v.
+            Q, the covariance of v. What it says of components that were not measured is not read.
+        angles : sequence of int, optional
+            Components of the measurement that are angles: their innovation is taken in [-pi, pi].
+        gate : float, optional
+            Probability with which a measurement that the model is right about passes; the rest is kept out.
 
         Returns
         -------
@@ -111,32 +175,138 @@ class KalmanFilter:
         Raises
         ------
         ValueError
-            An infinite measurement, or numbers in ``model`` or ``noise`` that are not finite; the belief is
-            unchanged then.
+            Shapes that do not fit, an infinite measurement, or numbers in ``model`` or ``noise`` that are not
+            finite; the belief is unchanged then.
         numpy.linalg.LinAlgError
-            The innovation's covariance has no inverse.
+            The innovation's covariance is not positive; the belief is unchanged then.
         """
         z = np.array(measurement, np.float64, ndmin=1)
-        measured = np.flatnonzero(~np.isnan(z))
-        z = z[measured]
-        observation = _matrix(model)[measured]
-        spread = _matrix(noise)[np.ix_(measured, measured)]
-        _require_finite("Kalman correction", z, observation, spread)
-        innovation = z - observation @ self.mean
-        innovation_covariance = observation @ self.covariance @ observation.T + spread
-        gain = np.linalg.solve(innovation_covariance, observation @ self.covariance).T
-        nis = float(innovation @ np.linalg.solve(innovation_covariance, innovation))
-        remaining = np.eye(self.mean.size) - gain @ observation
-        self.mean = self.mean + gain @ innovation
-        self.covariance = remaining @ self.covariance @ remaining.T + gain @ spread @ gain.T
-        return Correction(innovation, innovation_covariance, nis)
+        observation = _matrix(model)
+        require_shape("Kalman correction: model", observation, (z.size, self.mean.size))
+        expectation = Expectation(z, observation @ self.mean, observation, _matrix(noise), tuple(angles))
+        belief, correction = corrected(Gaussian(self.mean, self.covariance), expectation, gate)
+        wrap(belief.mean, self.angles)
+        self.mean, self.covariance = belief
+        return correction
+
+
+def corrected(
+    belief: Gaussian, expectation: Expectation, gate: float | None = None
+) -> tuple[Gaussian, Correction]:
+    """Weigh a measurement into a Gaussian, with Joseph's form of the covariance.
+
+    With S = H C Hᵀ + Q and K = C Hᵀ S⁻¹::
+
+        ν = z - expected,   x += K ν,   C = (I - K H) C (I - K H)ᵀ + K Q Kᵀ
+        NIS = νᵀ S⁻¹ ν,   log evidence = -(NIS + log det S + m log 2π) / 2
+
+    Parameters
+    ----------
+    belief : Gaussian
+        Before; it is not written to.
+    expectation : Expectation
+        What was measured and what the belief's mean leads to expect.
+    gate : float, optional
+        Probability with which a right measurement passes: the NIS must not exceed this quantile of chi-square.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit, or numbers that are not finite, NaN for what was not measured apart.
+    numpy.linalg.LinAlgError
+        S is not positive.
+    """
+    z, expected, jacobian, noise, angles = expectation
+    require_shape("Kalman correction: expected", expected, z.shape)
+    require_shape("Kalman correction: model", jacobian, (z.size, belief.mean.size))
+    require_shape("Kalman correction: noise", noise, (z.size, z.size))
+    measured = np.flatnonzero(~np.isnan(z))
+    h = jacobian[measured]
+    spread = noise[np.ix_(measured, measured)]
+    require_finite("Kalman correction", z[measured], expected[measured], h, spread)
+    residual = z - expected
+    wrap(residual, checked_angles("Kalman correction", angles, z.size))
+    nu = residual[measured]
+    if nu.size == 0:
+        return belief, Correction(nu, spread, 0.0, 0.0, accepted=True)
+    cross = h @ belief.covariance
+    innovation_covariance = symmetric(cross @ h.T + spread)
+    root = np.linalg.cholesky(innovation_covariance)
+    white = np.linalg.solve(root, nu)
+    nis = float(white @ white)
+    log_evidence = -0.5 * (nis + nu.size * _LOG_TWO_PI) - float(np.log(np.diagonal(root)).sum())
+    accepted = gate is None or nis <= chi_square.quantile(gate, nu.size)
+    correction = Correction(nu, innovation_covariance, nis, log_evidence, accepted)
+    if not accepted:
+        return belief, correction
+    gain = np.linalg.solve(innovation_covariance, cross).T
+    remaining = np.eye(belief.mean.size) - gain @ h
+    covariance = symmetric(remaining @ belief.covariance @ remaining.T + gain @ spread @ gain.T)
+    return Gaussian(belief.mean + gain @ nu, covariance), correction
+
+
+def wrap(values: Matrix, angles: Sequence[int]) -> None:
+    """Bring the named components into [-pi, pi], in place; NaN stays NaN."""
+    for k in angles:
+        if abs(values[k]) > math.pi:
+            values[k] = math.remainder(values[k], 2.0 * math.pi)
+
+
+def symmetric(matrix: Matrix) -> Matrix:
+    """Return the symmetric part: what rounding adds to the rest would grow."""
+    return 0.5 * (matrix + matrix.T)
+
+
+def checked_gaussian(where: str, mean: ArrayLike, covariance: ArrayLike) -> Gaussian:
+    """Return copies of a mean and a covariance as float64.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit, numbers that are not finite, a covariance that is not symmetric or has a
+        negative variance.
+    """
+    middle = np.array(mean, np.float64, ndmin=1)
+    spread = np.array(covariance, np.float64, ndmin=2)
+    size = middle.size
+    if middle.shape != (size,) or spread.shape != (size, size):
+        raise ValueError(
+            f"{where}: mean (n,) and covariance (n, n) are needed, got {middle.shape} and {spread.shape}"
+        )
+    require_finite(where, middle, spread)
+    if size and np.abs(spread - spread.T).max() > 1e-9 * np.abs(spread).max():
+        raise ValueError(f"{where}: a covariance must be symmetric, got {spread.tolist()}")
+    if (np.diagonal(spread) < 0.0).any():
+        raise ValueError(f"{where}: a variance must not be negative, got {np.diagonal(spread).tolist()}")
+    return Gaussian(middle, symmetric(spread))
+
+
+def checked_angles(where: str, angles: Sequence[int], size: int) -> tuple[int, ...]:
+    """Return which components are angles.
+
+    Raises
+    ------
+    ValueError
+        There is no such component.
+    """
+    chosen = tuple(angles)
+    if any(not 0 <= k < size for k in chosen):
+        raise ValueError(f"{where}: angles must be components 0 to {size - 1}, got {chosen}")
+    return chosen
+
+
+def require_shape(what: str, matrix: Matrix, shape: tuple[int, ...]) -> None:
+    """Raise ValueError if a matrix has another shape."""
+    if matrix.shape != shape:
+        raise ValueError(f"{what} must be {shape}, got {matrix.shape}")
+
+
+def require_finite(where: str, *arrays: Matrix) -> None:
+    """Raise ValueError if a number is not finite."""
+    for array in arrays:
+        if not np.isfinite(array).all():
+            raise ValueError(f"{where}: every number must be finite, got {array.tolist()}")
 
 
 def _matrix(values: ArrayLike) -> Matrix:
     return np.array(values, np.float64, ndmin=2)
-
-
-def _require_finite(where: str, *arrays: Matrix) -> None:
-    for array in arrays:
-        if not np.isfinite(array).all():
-            raise ValueError(f"{where}: every number must be finite, got {array.tolist()}")

@@ -1,0 +1,71 @@
+"""The unicycle linearised: pose, gyro bias, odometry scale and any slow states beside them, as one Gaussian.
+
+With d, t the control's distance and turn over a time T, d' = s d, t' = t - b T and m = heading + t'/2::
+
+    g:  north += d' cos m,   east += d' sin m,   heading += t'
+
+            heading      gyro bias b        odometry scale s
+    north   -d' sin m    +d' sin m T/2      d cos m
+    east    +d' cos m    -d' cos m T/2      d sin m
+    heading  1           -T                 0
+
+are the rows of its Jacobian G beyond the identity. Noise of distance and turn enters by the same derivatives; bias,
+scale and slow states walk before they act, as they do in :class:`filters.motion.Unicycle`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from filters.extended_kalman import Transition
+from filters.kalman import Matrix
+from filters.motion.slow import RandomWalk
+from filters.motion.unicycle import Unicycle, UnicycleControl
+
+
+class LinearisedUnicycle:
+    """Unicycle motion to first order.
+
+    Parameters
+    ----------
+    motion : Unicycle
+        Its noises and walks are used; what it has learned is not.
+    slow : sequence of RandomWalk
+        Further states that only wander, such as a range scale.
+    """
+
+    angles = (2,)
+
+    def __init__(self, motion: Unicycle, slow: Sequence[RandomWalk] = ()) -> None:
+        self._motion = motion
+        self.names = (*motion.names, *(walk.name for walk in slow))
+        walks = [0.0, 0.0, 0.0, motion.gyro_bias_walk, motion.odometry_scale_walk, *(s.walk for s in slow)]
+        self._walk_variances = np.square(np.array(walks, np.float64))
+
+    def move(self, mean: Matrix, control: UnicycleControl, duration: float) -> Transition:
+        """Linearise the motion at ``mean``; see :class:`filters.extended_kalman.LinearisedMotion`."""
+        if not all(map(math.isfinite, control)):
+            raise ValueError(f"unicycle: every number of the control must be finite, got {control}")
+        bias, scale = float(mean[3]), float(mean[4])
+        distance, turn = scale * control.distance, control.turn - bias * duration
+        middle = float(mean[2]) + 0.5 * turn
+        sine, cosine = math.sin(middle), math.cos(middle)
+
+        moved = mean.copy()
+        moved[:3] += (distance * cosine, distance * sine, turn)
+
+        by_turn = np.array([-0.5 * distance * sine, 0.5 * distance * cosine, 1.0])
+        by_distance = np.array([cosine, sine, 0.0])
+        jacobian = np.eye(mean.size)
+        jacobian[:2, 2] = (-distance * sine, distance * cosine)
+        jacobian[:3, 3] = -duration * by_turn
+        jacobian[:3, 4] = control.distance * by_distance
+
+        distance_variance, turn_variance = self._motion.noise_variances(control, duration)
+        noise = (jacobian * (self._walk_variances * duration)) @ jacobian.T
+        noise[:3, :3] += distance_variance * np.outer(by_distance, by_distance)
+        noise[:3, :3] += turn_variance * np.outer(by_turn, by_turn)
+        return Transition(moved, jacobian, noise)
