@@ -1,0 +1,404 @@
+"""The discrete Bayes filter: an exact belief over finitely many states.
+
+Table 4.1, Discrete_Bayes_filter, section 4.1.1 of *Probabilistic Robotics*; elsewhere the forward pass of a
+hidden Markov model. Line 3 predicts with the transition that belongs to the control, line 4 multiplies by the
+likelihood of the measurement and normalises. Nothing is approximated: the belief equals the sum over all
+paths of states.
+
+The belief is kept as logarithms, so that a thousand measurements may speak against a state and a thousand
+others bring it back. A prediction passes through probabilities; a state less likely than 1e-308 is given up
+there, unless a transition leads to it.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any, Generic, Protocol, TypeVar, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+State = TypeVar("State", bound=Hashable)
+
+ROW_TOLERANCE = 1e-9
+"""How far the probabilities of leaving a state, itself included, may be from one."""
+
+
+class Transition(Protocol):
+    """What moves a belief: p(x_k | u, x_i) for one control u."""
+
+    @property
+    def size(self) -> int:
+        """How many states it leads from and to."""
+        ...
+
+    def predict(self, belief: Vector) -> Vector:
+        """Line 3 of Table 4.1: the sum over i of p(x_k | u, x_i) p_i."""
+        ...
+
+
+class DenseTransition:
+    """A transition as a full matrix.
+
+    Parameters
+    ----------
+    matrix : (n, n) array
+        ``matrix[i, k]`` is p(x_k | u, x_i): from row to column, each row a distribution.
+
+    Raises
+    ------
+    ValueError
+        Not square, negative, not finite, or a row whose sum is not one to 1e-9.
+    """
+
+    def __init__(self, matrix: ArrayLike) -> None:
+        values = np.array(matrix, np.float64)
+        if values.ndim != 2 or values.shape[0] != values.shape[1] or values.size == 0:
+            raise ValueError(f"transition: a square matrix is needed, got shape {values.shape}")
+        _require_probabilities("transition", values)
+        sums = values.sum(axis=1)
+        _require_rows(sums)
+        self._matrix: Matrix = values / sums[:, None]
+
+    @property
+    def size(self) -> int:
+        """How many states there are."""
+        return len(self._matrix)
+
+    def predict(self, belief: Vector) -> Vector:
+        """Line 3 of Table 4.1 as a vector times a matrix."""
+        return belief @ self._matrix
+
+
+class SparseTransition:
+    """A transition of which most entries are zero, as triplets; costs as much as there are triplets.
+
+    Parameters
+    ----------
+    size : int
+        How many states there are.
+    source, target : (m,) array of int
+        From which state to which; a pair that occurs twice is added up.
+    probability : (m,) array
+        p(target | u, source). The ones of each source sum to one.
+
+    Raises
+    ------
+    ValueError
+        Lengths that differ, an index outside 0 to ``size - 1``, a probability negative or not finite, or a
+        source whose sum is not one to 1e-9.
+    """
+
+    def __init__(self, size: int, source: ArrayLike, target: ArrayLike, probability: ArrayLike) -> None:
+        values = np.array(probability, np.float64, ndmin=1)
+        rows, columns = _indices("source", source, size), _indices("target", target, size)
+        if not rows.shape == columns.shape == values.shape or values.ndim != 1:
+            raise ValueError(
+                f"sparse transition: source, target and probability must be of one length, got "
+                f"{rows.shape}, {columns.shape} and {values.shape}"
+            )
+        _require_probabilities("sparse transition", values)
+        sums: Vector = np.bincount(rows, values, size).astype(np.float64)
+        _require_rows(sums)
+        self._size = size
+        self._source = rows
+        self._target = columns
+        self._probability: Vector = values / sums[rows]
+
+    @property
+    def size(self) -> int:
+        """How many states there are."""
+        return self._size
+
+    def predict(self, belief: Vector) -> Vector:
+        """Line 3 of Table 4.1, the sum over the triplets only."""
+        moved = np.bincount(self._target, self._probability * belief[self._source], self._size)
+        return cast(Vector, moved)
+
+
+def transition(given: object) -> Transition:
+    """Make a transition of a matrix, or of a sparse matrix: anything with ``tocoo``, as scipy's have.
+
+    Returns
+    -------
+    Transition
+        What is one already is returned as it is.
+
+    Raises
+    ------
+    ValueError
+        As :class:`DenseTransition` and :class:`SparseTransition`.
+    """
+    if isinstance(given, DenseTransition | SparseTransition):
+        return given
+    if hasattr(given, "tocoo"):
+        triplets: Any = cast(Any, given).tocoo()
+        rows, columns = triplets.shape
+        if rows != columns:
+            raise ValueError(f"transition: a square matrix is needed, got shape {triplets.shape}")
+        return SparseTransition(rows, triplets.row, triplets.col, triplets.data)
+    if hasattr(given, "predict") and hasattr(given, "size"):
+        return cast(Transition, given)
+    return DenseTransition(cast(ArrayLike, given))
+
+
+def transition_over(rates: ArrayLike, duration: float) -> DenseTransition:
+    """Transition of a chain in continuous time over a duration: exp(Q t).
+
+    So a belief that is predicted at irregular times comes out the same however the time is cut. By
+    uniformisation over a step so short that no sum cancels, then repeated squaring.
+
+    Parameters
+    ----------
+    rates : (n, n) array
+        ``rates[i, k]`` is how often per second state i turns into k; the diagonal is not read.
+    duration : float
+        Seconds, not negative.
+
+    Raises
+    ------
+    ValueError
+        A rate or duration negative or not finite, or a matrix that is not square.
+    """
+    leaving = np.array(rates, np.float64, ndmin=2)
+    if leaving.ndim != 2 or leaving.shape[0] != leaving.shape[1]:
+        raise ValueError(f"transition rates: a square matrix is needed, got shape {leaving.shape}")
+    np.fill_diagonal(leaving, 0.0)
+    _require_probabilities("transition rates", leaving)
+    if not 0.0 <= duration < math.inf:
+        raise ValueError(f"transition rates: duration must be finite and not negative, got {duration} s")
+    fastest = float(leaving.sum(axis=1).max())
+    events = fastest * duration
+    squarings = max(0, math.ceil(math.log2(events))) if events > 1.0 else 0
+    events = math.ldexp(events, -squarings)
+    jump = leaving / max(fastest, sys.float_info.min)
+    jump += np.diag(1.0 - jump.sum(axis=1))
+    term = np.eye(len(leaving)) * math.exp(-events)
+    moved = term.copy()
+    for count in range(1, 24):  # 1 / 24! is below the last bit of one
+        term = term @ jump * (events / count)
+        moved += term
+    for _ in range(squarings):
+        moved = moved @ moved
+        moved /= moved.sum(axis=1, keepdims=True)
+    return DenseTransition(moved / moved.sum(axis=1, keepdims=True))
+
+
+class DiscreteBayesFilter(Generic[State]):
+    """A belief over labelled states: Table 4.1.
+
+    Parameters
+    ----------
+    states : sequence
+        A label for each state, all different: strings, numbers, members of an ``Enum``.
+    transitions : mapping of control to matrix, or one matrix
+        p(x_k | u, x_i) for each control u, from row i to column k, dense or sparse; see :func:`transition`.
+        One matrix alone belongs to the control ``None``.
+    belief : (n,) array, optional
+        Probabilities at the start, up to a common factor; uniform if not given.
+
+    Raises
+    ------
+    ValueError
+        No states or labels that occur twice, transitions that do not fit the states, or probabilities that
+        are negative, not finite or all zero.
+    """
+
+    def __init__(
+        self,
+        states: Sequence[State],
+        transitions: Mapping[Any, object] | object,
+        belief: ArrayLike | None = None,
+    ) -> None:
+        self.states: tuple[State, ...] = tuple(states)
+        self._places = {state: place for place, state in enumerate(self.states)}
+        if not self.states or len(self._places) < len(self.states):
+            raise ValueError(f"discrete filter: at least one state, all different, got {self.states}")
+        table = cast(
+            Mapping[Any, object], transitions if isinstance(transitions, Mapping) else {None: transitions}
+        )
+        self._transitions = {control: self._fitting(control, given) for control, given in table.items()}
+        self._log_belief: Vector = np.zeros(0)
+        self.reset(np.ones(len(self.states)) if belief is None else belief)
+
+    @property
+    def belief(self) -> Vector:
+        """Probability of each state, (n,) float64, in the order of ``states``; sums to one."""
+        return np.exp(self._log_belief)
+
+    @property
+    def log_belief(self) -> Vector:
+        """Its logarithm, (n,) float64; minus infinity for a state that cannot be."""
+        return self._log_belief.copy()
+
+    @property
+    def most_likely(self) -> State:
+        """The state of the largest probability; the first of them if several are equal."""
+        return self.states[int(np.argmax(self._log_belief))]
+
+    def probability(self, state: State) -> float:
+        """Probability of one state.
+
+        Raises
+        ------
+        ValueError
+            There is no state of that label.
+        """
+        try:
+            return math.exp(self._log_belief[self._places[state]])
+        except KeyError:
+            raise ValueError(f"discrete filter: no state {state!r} among {self.states}") from None
+
+    def reset(self, belief: ArrayLike) -> None:
+        """Start again from given probabilities, which are normalised.
+
+        Raises
+        ------
+        ValueError
+            As for the class; the belief is unchanged then.
+        """
+        self._log_belief = _normalised(_log(self._vector("belief", belief)), "belief")
+
+    def predict(self, control: Hashable = None) -> None:
+        """Line 3 of Table 4.1: move the belief as the control's transition says.
+
+        Raises
+        ------
+        ValueError
+            There is no transition for this control; the belief is unchanged then.
+        """
+        if control not in self._transitions:
+            known = ", ".join(repr(known) for known in self._transitions)
+            raise ValueError(f"discrete filter: no transition for control {control!r}; there are {known}")
+        self._move(self._transitions[control])
+
+    def propagate(self, given: object) -> None:
+        """Line 3 with a transition of this moment, such as :func:`transition_over` the time that has passed.
+
+        Raises
+        ------
+        ValueError
+            A transition that makes no sense or does not fit; the belief is unchanged then.
+        """
+        self._move(self._fitting("given", given))
+
+    def update(self, likelihoods: ArrayLike) -> float:
+        """Line 4 of Table 4.1: weigh every state by p(z | x_k), and normalise.
+
+        A measurement that no possible state explains changes nothing: the belief is kept, and the evidence
+        says that it was impossible.
+
+        Parameters
+        ----------
+        likelihoods : (n,) array
+            p(z | x_k), not negative and finite; a density is as good as a probability.
+
+        Returns
+        -------
+        float
+            Logarithm of the evidence p(z | what was before), 1 / eta of line 4; minus infinity if impossible.
+
+        Raises
+        ------
+        ValueError
+            A likelihood negative or not finite, or not one per state; the belief is unchanged then.
+        """
+        return self._weigh(_log(self._vector("likelihoods", likelihoods)))
+
+    def update_log(self, log_likelihoods: ArrayLike) -> float:
+        """Line 4 with log p(z | x_k), which may be any finite number or minus infinity; see :meth:`update`.
+
+        Raises
+        ------
+        ValueError
+            NaN or plus infinity, or not one per state; the belief is unchanged then.
+        """
+        logs = np.array(log_likelihoods, np.float64, ndmin=1)
+        self._require_one_each("log likelihoods", logs)
+        if np.isnan(logs).any() or (logs == math.inf).any():
+            raise ValueError(f"discrete filter: log likelihoods must be below infinity, got {logs.tolist()}")
+        return self._weigh(logs)
+
+    def _weigh(self, logs: Vector) -> float:
+        weighed = self._log_belief + logs
+        evidence = _log_sum(weighed)
+        if evidence > -math.inf:
+            self._log_belief = weighed - evidence
+        return evidence
+
+    def _move(self, moving: Transition) -> None:
+        moved = moving.predict(self.belief)
+        self._log_belief = _normalised(_log(moved), "prediction")
+
+    def _fitting(self, control: object, given: object) -> Transition:
+        try:
+            made = transition(given)
+        except ValueError as error:
+            raise ValueError(f"discrete filter: control {control!r}: {error}") from error
+        if made.size != len(self.states):
+            raise ValueError(
+                f"discrete filter: control {control!r}: the transition has {made.size} states, "
+                f"{len(self.states)} are needed"
+            )
+        return made
+
+    def _vector(self, what: str, values: ArrayLike) -> Vector:
+        vector = np.array(values, np.float64, ndmin=1)
+        self._require_one_each(what, vector)
+        _require_probabilities(f"discrete filter: {what}", vector)
+        return vector
+
+    def _require_one_each(self, what: str, vector: Vector) -> None:
+        if vector.shape != (len(self.states),):
+            raise ValueError(
+                f"discrete filter: {what} must have one number for each of {len(self.states)} states, got "
+                f"shape {vector.shape}"
+            )
+
+
+def _log(values: Vector) -> Vector:
+    with np.errstate(divide="ignore"):
+        return np.log(values)
+
+
+def _log_sum(logs: Vector) -> float:
+    top = float(logs.max())
+    return top + math.log(float(np.exp(logs - top).sum())) if top > -math.inf else -math.inf
+
+
+def _normalised(logs: Vector, what: str) -> Vector:
+    total = _log_sum(logs)
+    if total == -math.inf:
+        raise ValueError(f"discrete filter: {what}: at least one probability must be positive")
+    return logs - total
+
+
+def _require_probabilities(what: str, values: NDArray[np.float64]) -> None:
+    if not np.isfinite(values).all() or (values < 0.0).any():
+        place = int(np.flatnonzero(~np.isfinite(values) | (values < 0.0))[0])
+        raise ValueError(
+            f"{what}: every number must be finite and not negative, got {values.ravel()[place]} at {place}"
+        )
+
+
+def _require_rows(sums: Vector) -> None:
+    wrong = np.flatnonzero(np.abs(sums - 1.0) > ROW_TOLERANCE)
+    if wrong.size:
+        raise ValueError(
+            f"transition: the probabilities of leaving state {wrong[0]} must sum to one, got {sums[wrong[0]]}"
+        )
+
+
+def _indices(what: str, values: ArrayLike, size: int) -> NDArray[np.intp]:
+    given = np.array(values, ndmin=1)
+    if not np.issubdtype(given.dtype, np.integer):
+        raise ValueError(f"sparse transition: {what} must be whole numbers, got {given.dtype}")
+    if given.size and not 0 <= given.min() <= given.max() < size:
+        raise ValueError(
+            f"sparse transition: {what} must lie in 0 to {size - 1}, got {given.min()} to {given.max()}"
+        )
+    return given.astype(np.intp)
