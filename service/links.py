@@ -71,13 +71,15 @@ def _can(link: CanLink) -> Link:
 
 def can_settings(link: CanLink) -> CanSettings:
     """Return the driver's settings of a CAN link; a log of it is read with the same."""
-    from drivers.can import CanSettings
+    from drivers.can import CanSettings, SignalSettings
 
     return CanSettings(
         interface=link.interface,
         channel=link.channel,
         bitrate=link.bitrate,
         protocol=link.protocol,
+        dbc=link.dbc,
+        signals=tuple(SignalSettings(**signal.model_dump()) for signal in link.signal),
         options=link.options,
         range_orientation=link.range_orientation,
     )

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 
+from drivers.can.decoder import Filter
 from drivers.can.dsdl import MalformedPayload, Message
 from drivers.can.frame import CanFrame
 from drivers.can.readings import DATA_TYPES, PassedOver, Refused, readings_of
 from drivers.can.settings import CanSettings
-from drivers.can.transfer import Reassembler, Transfer
+from drivers.can.traffic import Traffic
+from drivers.can.transfer import Reassembler, Transfer, message_identifier
 from drivers.clock import US_56, ClockMap
 from drivers.plausibility import implausible
 from drivers.sample import AnyReading, Sample
@@ -57,6 +59,15 @@ class Decoder:
     def clock(self) -> ClockMap | None:
         """The clock of the node with the least steady stamps; ``None`` while no stamp has come."""
         return max(self._clocks.values(), key=lambda clock: clock.jitter or 0.0, default=None)
+
+    @property
+    def filters(self) -> list[Filter]:
+        """What an interface has to let through: the wanted message types from any node."""
+        return [Filter(*message_identifier(data_type), True) for data_type in DATA_TYPES]
+
+    def census(self) -> Traffic:
+        """Return a new count of transfers by type."""
+        return Traffic()
 
     def decode(self, frame: CanFrame, received_ns: int) -> list[Sample]:
         """Take one frame; return the samples of the transfer that it completes.

@@ -14,12 +14,10 @@ import can
 from can.interfaces.slcan import slcanBus
 
 from drivers.can.arrival import ArrivalClock
-from drivers.can.dronecan import Decoder
+from drivers.can.decoder import decoder_of
 from drivers.can.frame import CanFrame
 from drivers.can.multicast import MulticastBus
-from drivers.can.readings import DATA_TYPES
 from drivers.can.settings import CanSettings
-from drivers.can.transfer import message_identifier
 from drivers.link import LinkError
 from drivers.sample import LinkReport, Sample
 
@@ -89,12 +87,17 @@ class CanLink:
         As in the configuration.
     settings : CanSettings
         Which bus, and what is spoken on it.
+
+    Raises
+    ------
+    ValueError
+        The DBC file cannot be used, or a signal is not in it.
     """
 
     def __init__(self, name: str, settings: CanSettings) -> None:
         self._name = name
         self._settings = settings
-        self._decoder = Decoder(name, settings)
+        self._decoder = decoder_of(name, settings)
         self._arrivals = ArrivalClock()
         self._bus: can.BusABC | None = None
         self._broken: LinkError | None = None
@@ -152,8 +155,8 @@ class CanLink:
             arguments["bitrate"] = settings.bitrate
         if settings.interface in _FILTERING:
             arguments["can_filters"] = [
-                {"can_id": identifier, "can_mask": mask, "extended": True}
-                for identifier, mask in map(message_identifier, DATA_TYPES)
+                {"can_id": wanted.identifier, "can_mask": wanted.mask, "extended": wanted.extended}
+                for wanted in self._decoder.filters
             ]
         # Only what the configuration says: python-can would also read files of its own in the home directory.
         return can.Bus(settings.channel, settings.interface, ignore_config=True, **arguments)

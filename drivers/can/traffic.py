@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any, cast
+from collections.abc import Mapping
+from typing import Any, Protocol, cast
 
 import dronecan
 
@@ -11,6 +12,54 @@ from drivers.can.frame import CanFrame
 
 _SERVICE = 0x80
 _START = 0x80
+
+
+_MOST_IDENTIFIERS = 4096
+
+
+class Census(Protocol):
+    """Counts what passes by on a bus."""
+
+    def count(self, frame: CanFrame) -> None:
+        """Take note of one frame."""
+        ...
+
+    def kinds(self) -> dict[str, int]:
+        """Return the counts by name."""
+        ...
+
+
+class IdentifierTraffic:
+    """Counts frames by identifier, under the names of a DBC file where it has one.
+
+    Memory is bounded: a bus with more than 4,096 identifiers has its further ones counted as ``others``.
+
+    Parameters
+    ----------
+    names : Mapping[tuple[bool, int], str]
+        By (extended, identifier).
+    """
+
+    def __init__(self, names: Mapping[tuple[bool, int], str]) -> None:
+        self._names = names
+        self._counts: Counter[tuple[bool, int]] = Counter()
+        self._others = 0
+
+    def count(self, frame: CanFrame) -> None:
+        """Take note of one frame."""
+        key = (frame.extended, frame.identifier)
+        if key in self._counts or len(self._counts) < _MOST_IDENTIFIERS:
+            self._counts[key] += 1
+        else:
+            self._others += 1
+
+    def kinds(self) -> dict[str, int]:
+        """Return the counts by name: ``WHEEL_SPEEDS``, ``0x0B4``, ``0x18FEF100``, ``others``."""
+        counts = {
+            self._names.get(key, f"0x{key[1]:08X}" if key[0] else f"0x{key[1]:03X}"): count
+            for key, count in self._counts.items()
+        }
+        return counts | ({"others": self._others} if self._others else {})
 
 
 class Traffic:

@@ -9,6 +9,7 @@ from pathlib import Path
 from rich.table import Table
 
 from service.config import CanLink, Configuration, Link, MavlinkLink
+from service.config.signals import notes_on_signals
 
 KEYS = (
     "estimate", "estimate/slow", "particles", "budget", "sensors", "health",
@@ -123,6 +124,8 @@ def _link_notes(link: Link) -> Iterator[str]:
             yield f'link "{link.name}": there is no interface {link.channel} here now; it will be retried'
         if link.signal and link.protocol != "dbc":
             yield f'link "{link.name}": its signals are not used, for the protocol is {link.protocol}'
+        if link.protocol == "dbc":
+            yield from notes_on_signals(link)
     if isinstance(link, MavlinkLink):
         device = link.url.split(",")[0]
         if device.startswith("/dev/") and not Path(device).exists():

@@ -13,6 +13,7 @@ from typing import Any, cast
 from service.config.complaints import did_you_mean
 from service.config.places import place_in_words
 from service.config.section import shown
+from service.config.signals import wrong_signals
 
 Table = Mapping[str, Any]
 
@@ -25,12 +26,11 @@ NOT_BUILT: dict[tuple[str, str], tuple[frozenset[object], str]] = {
     ),
     ("sensor", "estimate"): (frozenset({"delay"}), "scale, bias"),
     ("link", "send"): (frozenset({"odometry", "gps_input", "global_position_sensor"}), "none"),
-    ("link", "protocol"): (frozenset({"dbc"}), "dronecan"),
 }
 NOT_READ = (("map", "terrain"), ("map", "occupancy"), ("map", "landmarks"), ("publish", "ros2_domain"))
 _NOTHING: tuple[object, ...] = ("", -1)
 
-FILES = (("link", "signing_key_file"), ("publish", "zenoh"))
+FILES = (("link", "signing_key_file"), ("link", "dbc"), ("publish", "zenoh"))
 """Keys that name files; relative ones are relative to the configuration's folder."""
 
 
@@ -181,4 +181,5 @@ def across_sections(raw: Table) -> list[str]:
         *_slow_states_of_ranges(raw),
         *_slow_states_only_once(raw),
         *_absent_files(raw),
+        *wrong_signals(entries(raw, "link"), raw),
     ]

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from service.config.section import Flag, Name, Number, Section, Whole, shown
+from service.config.section import Flag, Name, Number, Positive, Section, Whole, shown
 
 
 def _scalar(value: Any) -> Any:
@@ -86,14 +86,51 @@ class Signal(Section):
 
     signal: Annotated[str, Field(pattern=r"^[^.\s]+\.[^.\s]+$")]
     """MESSAGE.SIGNAL as the DBC file names them."""
-    measures: Literal["speed", "yaw_rate", "heading", "distance", "motor_speed", "altitude"]
-    """What it measures, in SI units once scaled: m/s, rad/s, rad, m, rad/s, m."""
-    scale: Number = 1.0
-    """Factor from the signal's unit to SI: 0.2778 for km/h, 0.0174533 for degrees."""
+    measures: Literal[
+        "speed",
+        "wheel_speed",
+        "distance",
+        "yaw_rate",
+        "heading",
+        "motor_speed",
+        "range",
+        "clearance",
+        "altitude",
+        "pressure",
+    ]
+    """What it measures: speed of the vehicle or of one wheel, distance that one wheel has rolled, …
+
+    The wheels of one message are read together."""
+    scale: Annotated[float, Field(strict=True, allow_inf_nan=False)] | None = None
+    """Factor from the signal's unit to SI (m/s, rad/s, rad, m, Pa): 0.2778 for km/h, 0.0174533 for degrees.
+
+    Default: by the unit that the DBC file gives."""
     offset: Number = 0.0
-    """Added after scaling, in SI units."""
+    """Added last, in SI units."""
+    reversed: Flag = False
+    """It counts the other way, as a car's yaw rate that is positive to the left: its sign is changed."""
+    sigma: Positive | None = None
+    """Standard deviation that its readings claim, SI; without it: what the [[sensor]] says."""
     index: Annotated[Whole, Field(ge=0, le=15)] = 0
-    """Which wheel or motor, where there are several (distance, motor_speed)."""
+    """Which wheel or motor, where there are several; of two wheels that give a yaw rate 0 is the left one."""
+    beacon: Annotated[Whole, Field(ge=0, le=65535)] | None = None
+    """For a range: the id of the beacon that it is measured to."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Signal:
+        if self.measures == "range" and self.beacon is None:
+            raise PydanticCustomError("signal", 'measures = "range" needs beacon, the id of a [[beacon]]')
+        if self.measures != "range" and self.beacon is not None:
+            raise PydanticCustomError(
+                "signal",
+                'beacon belongs to measures = "range", and this is "{measures}"',
+                {"measures": self.measures},
+            )
+        if self.scale == 0.0:
+            raise PydanticCustomError(
+                "signal", "scale: needs a number that is not 0: nothing would be left of it"
+            )
+        return self
 
 
 class CanLink(Section):

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from drivers.logs import LogReader
-from drivers.logs.candump import CandumpReader
+from drivers.logs import LogReader, candump
+from drivers.logs.canlog import CanLogReader
 from drivers.logs.tlog import TlogReader
 from drivers.sample import Sample
 from service.config import CanLink, Configuration, MavlinkLink
@@ -58,7 +58,7 @@ def open_log(path: Path, configuration: Configuration) -> LogReader:
         if link.kind == kind.link and isinstance(link, MavlinkLink):
             return TlogReader(path, link.name, mavlink_settings(link))
         if link.kind == kind.link and isinstance(link, CanLink):
-            return CandumpReader(path, link.name, can_settings(link))
+            return CanLogReader(path, link.name, can_settings(link), candump.frames)
     raise LogError(f"{path} is a {kind.meaning}, and the configuration has no link of kind {kind.link}")
 
 

@@ -312,8 +312,8 @@ def test_transport_and_contents_are_counted_together() -> None:
 
 
 def test_another_protocol_is_refused_when_the_settings_are_made() -> None:
-    with pytest.raises(ValueError, match="protocol: 'dbc' cannot be decoded; supported: dronecan"):
-        CanSettings(protocol="dbc")
+    with pytest.raises(ValueError, match="protocol: 'cyphal' cannot be decoded; supported: dronecan, dbc"):
+        CanSettings(protocol="cyphal")
 
 
 @pytest.mark.parametrize("kind", sorted(DATA_TYPES))

@@ -11,12 +11,18 @@ from hypothesis import strategies as st
 
 from drivers.can import CanFrame, CanSettings
 from drivers.logs import LogReader
-from drivers.logs.candump import CandumpReader, parse
+from drivers.logs.candump import frames as candump_frames
+from drivers.logs.candump import parse
+from drivers.logs.canlog import CanLogReader
 from drivers.sample import GeodeticPosition, Pressure, Velocity
 from tests.drivers.can.encoding import fix, frames, message
 
 START_NS = 1_700_000_000_123_456_000
 CAR = Path(__file__).parents[4] / "shared" / "data" / "comma2k19_seg40.candump.gz"
+
+
+def opened(path: Path) -> CanLogReader:
+    return CanLogReader(path, "bus", CanSettings(), candump_frames)
 
 
 def line(frame: CanFrame, at_ns: int, channel: str = "can0") -> str:
@@ -30,9 +36,9 @@ def lines(payload: object, at_ns: int = START_NS, channel: str = "can0", number:
     return [line(f, at_ns + 1000 * i, channel) for i, f in enumerate(frames(payload, number=number))]
 
 
-def reader(path: Path, *text: str) -> CandumpReader:
+def reader(path: Path, *text: str) -> CanLogReader:
     path.write_text("\n".join(text) + "\n")
-    return CandumpReader(path, "bus", CanSettings())
+    return opened(path)
 
 
 def test_one_line_by_hand() -> None:
@@ -124,7 +130,7 @@ def test_a_recording(tmp_path: Path, name: str) -> None:
     text = "\n".join(lines(fix()) + lines(message("air_data.StaticPressure", static_pressure=9e4))) + "\n"
     path = tmp_path / name
     path.write_bytes(text.encode() if name == "drive.log" else gzip.compress(text.encode()))
-    log: LogReader = CandumpReader(path, "bus", CanSettings())
+    log: LogReader = opened(path)
     assert log.position == 0
     samples = list(log)
     assert [type(s.reading) for s in samples] == [GeodeticPosition, Velocity, Pressure]
@@ -153,7 +159,7 @@ def test_damage_is_counted_and_ends_nothing(tmp_path: Path) -> None:
 def test_bytes_that_are_no_text_and_lines_without_end(tmp_path: Path) -> None:
     path = tmp_path / "binary.log"
     path.write_bytes(bytes(range(256)) * 100 + b"\n" + "\n".join(lines(fix())).encode())
-    log = CandumpReader(path, "bus", CanSettings())
+    log = opened(path)
     assert len(list(log)) == 2
     assert set(log.report().malformed) == {"bad_line"}
 
@@ -163,11 +169,11 @@ def test_a_zipped_file_cut_short_gives_what_is_there(tmp_path: Path) -> None:
     whole = gzip.compress(text)
     path = tmp_path / "cut.log.gz"
     path.write_bytes(whole[: len(whole) // 2])
-    log = CandumpReader(path, "bus", CanSettings())
+    log = opened(path)
     assert 100 < len(list(log)) < 4000
     assert log.report().malformed["truncated_file"] == 1
     path.write_bytes(whole[: len(whole) // 2] + b"\xff" * 100 + whole[len(whole) // 2 + 100 :])
-    damaged = CandumpReader(path, "bus", CanSettings())
+    damaged = opened(path)
     assert len(list(damaged)) > 100
     assert damaged.report().malformed["truncated_file"] == 1
 
@@ -175,7 +181,7 @@ def test_a_zipped_file_cut_short_gives_what_is_there(tmp_path: Path) -> None:
 def test_a_zipped_file_that_is_damaged_at_once(tmp_path: Path) -> None:
     path = tmp_path / "damaged.log.gz"
     path.write_bytes(gzip.compress(b"")[:10] + b"\x07" + bytes(20))  # a block of a type that there is not
-    log = CandumpReader(path, "bus", CanSettings())
+    log = opened(path)
     assert not list(log)
     assert log.report().malformed == {"truncated_file": 1}
 
@@ -208,7 +214,7 @@ def test_the_receive_clock_never_goes_back(tmp_path: Path) -> None:
 
 def test_an_absent_file_is_an_error_at_once(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
-        CandumpReader(tmp_path / "absent.log", "bus", CanSettings())
+        opened(tmp_path / "absent.log")
 
 
 @pytest.mark.recordings
@@ -216,7 +222,7 @@ def test_an_absent_file_is_an_error_at_once(tmp_path: Path) -> None:
 def test_a_minute_of_a_real_car() -> None:
     """135,468 frames with 11-bit identifiers: not DroneCAN, so nothing is understood, and nothing is
     damaged."""
-    log = CandumpReader(CAR, "bus", CanSettings())
+    log = opened(CAR)
     assert not list(log)
     report = log.report()
     assert (report.ignored, report.malformed) == (135_468, {})
