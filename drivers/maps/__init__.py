@@ -1,0 +1,1 @@
+"""Maps from files, in the frame that is used inside: north, east, down."""
