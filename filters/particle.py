@@ -8,24 +8,31 @@ from itertools import pairwise
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from filters.belief import STILL, Displacement, Evidence, Moments
 from filters.kernels import random, resampling, weights
 from filters.kernels.compile import Float32Array
+from filters.kernels.regularization import shrink
 from filters.motion.model import Motion
-from filters.motion.slow import PERIOD, RandomWalk, diffuse
+from filters.motion.slow import RandomWalk, diffuse
+from filters.motion.walks import Walks
+from filters.particle_checks import check_injected, check_shape, check_slow, check_start
+from filters.particle_moments import MomentSums
 from filters.particle_set import ParticleSet
+from filters.regularization import Rule, root, weighted_covariance
+from filters.resampling import Resampler, systematic
 from filters.sensing.model import Sensor
 
 Control = TypeVar("Control")
 M = TypeVar("M", bound=tuple[float | None, ...])
 
-POSE = ("north", "east", "heading")
 EVIDENCE_SAMPLE = 2048
-FAR = 1e4
-"""Square of the mean's distance from the reference over the variance; four digits of seven are lost."""
+"""Most particles that the evidence of a measurement is taken over."""
+
 _RESAMPLING_STREAM = 1 << 32
+_INJECTION_STREAM = 2 << 32
+_KERNEL_STREAM = 3 << 32
 
 
 class ParticleFilter(Generic[Control]):
@@ -71,7 +78,7 @@ class ParticleFilter(Generic[Control]):
         block: int = 32768,
     ) -> None:
         names = tuple(motion.names) + tuple(walk.name for walk in slow)
-        _check_shape(names, capacity, block)
+        check_shape(names, capacity, block)
         self.names: Final = names
         self.capacity: Final = capacity
         self.collapses = 0
@@ -91,14 +98,13 @@ class ParticleFilter(Generic[Control]):
         rows = max(2 * self._pairs, 2)
         self._noise: Float32Array = np.zeros((rows, min(block, capacity)), np.float32)
         self._no_noise: Float32Array = np.zeros((rows, 1), np.float32)
-        self._walks = _Walks((*motion.walks, *slow), self._particles, seed, self._pairs)
+        self._walks = Walks((*motion.walks, *slow), self._particles, seed, self._pairs)
         self._keys = [random.key(seed, stream) for stream in range(self._pairs)]
         self._places = np.zeros(capacity, np.int32)
         self._sample: Float32Array = np.zeros(0, np.float32)
         self._bounds: list[tuple[int, int]] = []
         self._sums = np.zeros(2)
-        self._moment_sums = np.zeros(weights.SUMS + 2 * (len(names) - len(POSE)))
-        self._reference = np.zeros(len(POSE), np.float32)
+        self._moment_sums = MomentSums(self._particles, self._weights, self._centre)
         self._log_sum = 0.0
         self._stride = 1
         self._centre_values: dict[str, float] = {}
@@ -151,7 +157,7 @@ class ParticleFilter(Generic[Control]):
             value that is not finite.
         """
         given = {name: np.asarray(column, np.float64) for name, column in columns.items()}
-        count = _check_columns(given, self.names, self.capacity)
+        count = check_start(given, self.names, self.capacity)
         for name, row in self._particles.rows.items():
             self._particles.columns[row, :count] = given[name]
             self._centre.columns[row, 0] = given[name].mean()
@@ -246,71 +252,115 @@ class ParticleFilter(Generic[Control]):
         """
         self._settle()
         shift = STILL if displacement is None else displacement
-        centre: list[float] = self._centre.columns[:, 0].tolist()
-        north, east, heading = self._displaced(centre, shift)
-        sums, offset = self._sums_about(shift, north, east, heading)
-        if abs(offset) > 1e-6 and sums[12] + abs(offset) >= 3.14:
-            # some particle's difference wraps elsewhere about the mean than about the reference
-            heading += offset
-            sums, offset = self._sums_about(shift, north, east, heading)
-        total = sums[0]
-        n, e, h = sums[1] / total, sums[2] / total, sums[3] / total
-        if n * n + e * e > FAR * (sums[6] / total - n * n + sums[8] / total - e * e):
-            # the belief has jumped: single precision has no digits left for its spread about the old centre
-            centre[0] += n
-            centre[1] += e
-            north, east, _ = self._displaced(centre, shift)
-            sums, offset = self._sums_about(shift, north, east, heading)
-            total = sums[0]
-            n, e, h = sums[1] / total, sums[2] / total, sums[3] / total
-        ne, nh, eh = sums[7] / total - n * e, sums[9] / total - n * h, sums[10] / total - e * h
-        nn = max(sums[6] / total - n * n, 0.0)
-        ee = max(sums[8] / total - e * e, 0.0)
-        hh = max(sums[11] / total - 2.0 * offset * h + offset * offset, 0.0)
-        ne = math.copysign(min(abs(ne), math.sqrt(nn * ee)), ne)  # rounding: few particles lie on a line
-        slow: list[float] = []
-        variance = [nn, ee, hh]
-        for row, place in enumerate(range(weights.SUMS, len(sums), 2), len(POSE)):
-            away = sums[place] / total
-            slow.append(centre[row] + away)
-            variance.append(max(sums[place + 1] / total - away * away, 0.0))
-        for name, given_path in self._motion.conditional_variances.items():
-            variance[self._particles.rows[name]] += given_path
-        mean_heading = heading + offset
-        self._centre.columns[:, 0] = (centre[0] + n, centre[1] + e, _wrap(mean_heading - shift.turn), *slow)
+        given_path = self._motion.conditional_variances
+        moments = self._moment_sums.moments(shift, self._bounds, given_path, self.effective_sample_size)
         self._centre_values.clear()
-        return Moments(
-            self.names,
-            np.array((north + n, east + e, _wrap(mean_heading), *slow)),
-            np.array((nn, ne, nh, ne, ee, eh, nh, eh, hh)).reshape(3, 3),
-            np.array(variance),
-            self.effective_sample_size,
-        )
+        return moments
 
-    def resample(self, count: int | None = None) -> None:
-        """Lines 8 to 11 by Table 4.4: draw ``count`` particles, equally weighted; as many as now by default.
+    def resample(self, count: int | None = None, scheme: Resampler = systematic) -> None:
+        """Lines 8 to 11: draw ``count`` particles, equally weighted; as many as now by default.
 
         The copies are dealt to the blocks in turn, so every block is a fair sample of the whole.
+
+        Parameters
+        ----------
+        count : int, optional
+            How many there will be.
+        scheme : Resampler
+            How they are drawn: Table 4.4, or another of :mod:`filters.resampling`.
 
         Raises
         ------
         ValueError
-            A count below 1 or above the capacity.
+            A count below 1 or above the capacity, or what the scheme refuses; the set is as it was then.
         """
         self._settle()
         target = self.count if count is None else count
         if not 1 <= target <= self.capacity:
             raise ValueError(f"resample: count must lie in 1 to {self.capacity} (the capacity), got {target}")
+        uniform = random.uniform(self._seed, _RESAMPLING_STREAM, self._draws + 1)
+        ancestors = scheme(self._weights[: self.count], target, uniform, self._ancestors[:target])
         self._draws += 1
-        uniform = random.uniform(self._seed, _RESAMPLING_STREAM, self._draws)
-        source = self._weights[: self.count]
-        ancestors = self._ancestors[:target]
-        resampling.systematic(source, resampling.total(source), uniform, ancestors)
         self._recount(target)
         columns = self._particles.columns
         resampling.deal(columns, self._spare, ancestors, self._places[:target])
         self._particles.columns, self._spare = self._spare, columns
         self._level()
+
+    def inject(
+        self, columns: Mapping[str, ArrayLike], count: int | None = None, scheme: Resampler = systematic
+    ) -> None:
+        """Resample, and put given particles in the place of some: the belief becomes a mixture of the two.
+
+        Of ``count`` particles as many as were given are new, and the others a fair sample of the belief, all with the
+        same weight: with k of n new ones, (1 - k / n) bel + (k / n) p, where p is what they were drawn from. Every
+        place is as likely to be taken as any other.
+
+        Parameters
+        ----------
+        columns : mapping of str to (k,) array
+            Some dimensions by name. A dimension that is not given keeps the value of the particle in that place, so
+            slow states outlive a jump of the pose.
+        count : int, optional
+            How many there will be, the given ones among them; as many as now by default.
+        scheme : Resampler
+            As in :meth:`resample`.
+
+        Raises
+        ------
+        ValueError
+            A dimension that is unknown, lengths that differ, a length of 0 or above ``count``, a value that is not
+            finite, or a count that :meth:`resample` refuses; the set is as it was then.
+        """
+        given = {name: np.asarray(column, np.float64) for name, column in columns.items()}
+        target = self.count if count is None else count
+        injected = check_injected(given, self.names, target)
+        if "heading" in given:
+            given["heading"] = np.remainder(given["heading"] + math.pi, 2.0 * math.pi) - math.pi
+        self.resample(target, scheme)
+        offset = random.uniform(self._seed, _INJECTION_STREAM, self._draws)
+        places = ((np.arange(injected) + offset) * (target / injected)).astype(np.int64)
+        for name, column in given.items():
+            self._particles.columns[self._particles.rows[name], places] = column
+
+    def resample_regularized(
+        self, names: Sequence[str], rule: Rule, count: int | None = None, scheme: Resampler = systematic
+    ) -> None:
+        """Resample, and draw some slow states anew from a kernel about each copy (:mod:`filters.regularization`).
+
+        Parameters
+        ----------
+        names : sequence of str
+            The slow states, spread together by their covariance before resampling.
+        rule : Rule
+            Which kernel: ``Preserving()`` keeps mean and covariance, ``Spreading()`` adds to the covariance.
+        count, scheme
+            As in :meth:`resample`.
+
+        Raises
+        ------
+        ValueError
+            No names or one twice, one of the pose, or one that the motion model marginalises (what is open of it is
+            not in the column); or what :meth:`resample` refuses. The set is as it was then.
+        KeyError
+            There is no dimension of that name.
+        """
+        check_slow(names, self._motion.conditional_variances)
+        rows = [self._particles.row(name) for name in names]
+        mean, covariance = weighted_covariance(self._particles.columns[rows, : self.count], self.weights)
+        factor, bandwidth = rule.kernel(self.effective_sample_size, len(rows))
+        self.resample(count, scheme)
+        spread = bandwidth * root(covariance)
+        step = self._draws & 0xFFFFFFFF
+        for first, last in self._bounds:
+            for row, centre in zip(rows, mean, strict=True):
+                shrink(self._particles.columns, row, first, last, centre, factor)
+            for axis in range(len(rows)):
+                if axis % 2 == 0:
+                    key = random.key(self._seed, _KERNEL_STREAM + axis)
+                    random.normal_pairs(first, last, step, key, self._noise, 0)
+                for row, sigma in zip(rows, spread[:, axis], strict=True):
+                    diffuse(self._particles.columns, row, first, last, self._noise, axis % 2, sigma)
 
     def cloud(
         self, count: int, displacement: Displacement | None = None, out: Float32Array | None = None
@@ -371,107 +421,3 @@ class ParticleFilter(Generic[Control]):
         if not self._centre_values:
             self._centre_values.update(zip(self.names, self._centre.columns[:, 0].tolist(), strict=True))
         return self._centre_values
-
-    def _displaced(self, centre: list[float], shift: Displacement) -> list[float]:
-        """Pose of the displaced centre, rounded to float32 as the kernel will see it."""
-        north, east, heading, *_ = centre
-        sine, cosine = math.sin(heading), math.cos(heading)
-        self._reference[:] = (
-            north + shift.forward * cosine - shift.right * sine,
-            east + shift.forward * sine + shift.right * cosine,
-            heading + shift.turn,
-        )
-        return self._reference.tolist()
-
-    def _sums_about(
-        self, shift: Displacement, north: float, east: float, heading: float
-    ) -> tuple[list[float], float]:
-        """Sums about a reference pose, and how far the circular mean lies from the reference heading."""
-        sums = self._moment_sums
-        sums.fill(0.0)
-        forward, right, turn = shift
-        columns, weight, references = self._particles.columns, self._weights, self._centre.columns
-        for first, last in self._bounds:
-            weights.moments(columns, weight, first, last, forward, right, turn, north, east, heading, sums)
-            weights.spread(columns, weight, first, last, references, sums)
-        values: list[float] = sums.tolist()
-        return values, math.atan2(values[4], values[5])
-
-
-class _Walk:
-    """One or two slow states that share a pair of normals, and the motion gathered since they last walked."""
-
-    def __init__(
-        self, walks: Sequence[RandomWalk], particles: ParticleSet, key: int, head_start: float
-    ) -> None:
-        self._rows = [(particles.row(walk.name), walk.walk) for walk in walks]
-        self._key = key
-        self._gathered = 0.0
-        self._threshold = head_start
-        self._sigma = 0.0
-
-    def due(self, duration: float) -> bool:
-        self._gathered += duration
-        if self._gathered < self._threshold:
-            return False
-        self._sigma = math.sqrt(self._gathered)
-        self._gathered = 0.0
-        self._threshold = PERIOD
-        return self._sigma > 0.0
-
-    def apply(self, particles: ParticleSet, first: int, last: int, noise: Float32Array, step: int) -> None:
-        random.normal_pairs(first, last, step, self._key, noise, 0)
-        for noise_row, (row, walk) in enumerate(self._rows):
-            diffuse(particles.columns, row, first, last, noise, noise_row, walk * self._sigma)
-
-
-class _Walks:
-    """All slow states in pairs, which walk in different ticks so that no tick pays for all of them."""
-
-    def __init__(self, walks: Sequence[RandomWalk], particles: ParticleSet, seed: int, stream: int) -> None:
-        moving = [walk for walk in walks if walk.walk > 0.0]
-        pairs = [moving[i : i + 2] for i in range(0, len(moving), 2)]
-        self._pairs = [
-            _Walk(pair, particles, random.key(seed, stream + i), PERIOD * (i + 1) / len(pairs))
-            for i, pair in enumerate(pairs)
-        ]
-
-    def due(self, duration: float) -> list[_Walk]:
-        return [pair for pair in self._pairs if pair.due(duration)]
-
-
-def _wrap(angle: float) -> float:
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
-
-
-def _check_shape(names: tuple[str, ...], capacity: int, block: int) -> None:
-    if capacity < 1 or block < 1:
-        raise ValueError(
-            f"particle filter: capacity and block must be at least 1, got {capacity} and {block}"
-        )
-    if names[:3] != POSE:
-        raise ValueError(
-            f"particle filter: the first columns must be {', '.join(POSE)}, got {', '.join(names)}"
-        )
-    if len(set(names)) < len(names):
-        raise ValueError(f"particle filter: a name occurs twice among {', '.join(names)}")
-
-
-def _check_columns(columns: Mapping[str, NDArray[Any]], names: tuple[str, ...], capacity: int) -> int:
-    if set(columns) != set(names):
-        raise ValueError(
-            f"initialize: columns must be {', '.join(names)}; missing {sorted(set(names) - set(columns))}, "
-            f"unknown {sorted(set(columns) - set(names))}"
-        )
-    shapes = {name: column.shape for name, column in columns.items()}
-    count = shapes[names[0]][0] if len(shapes[names[0]]) == 1 else 0
-    if set(shapes.values()) != {(count,)}:
-        raise ValueError(f"initialize: columns must be one-dimensional and of one length, got {shapes}")
-    if not 1 <= count <= capacity:
-        raise ValueError(f"initialize: 1 to {capacity} particles (the capacity) are possible, got {count}")
-    for name, column in columns.items():
-        if not np.isfinite(column).all():
-            raise ValueError(
-                f"initialize: column {name} has {np.sum(~np.isfinite(column))} values that are not finite"
-            )
-    return count

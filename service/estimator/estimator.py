@@ -19,6 +19,7 @@ from drivers.plausibility import implausible
 from drivers.sample import GeodeticPosition, LocalPosition, Origin, Sample
 from filters.kld import Demand
 from filters.particle import ParticleFilter
+from filters.policy import EffectiveShare, Policy, Wear
 from service.config import Configuration
 from service.estimate import Estimate, SensorStatus
 from service.estimator.binding import (
@@ -53,8 +54,8 @@ n-th is taken and the rest refused as ``thinned``: on time goes first (degradati
 OUTLIER = 0.5
 """Probability of being the outlier part's from which a measurement counts as refused: it moved next to nothing."""
 
-RESAMPLE_BELOW = 0.5
-"""Share of the particles: equation 4.36's effective sample size below it asks for resampling."""
+RESAMPLING: Policy = EffectiveShare(0.5)
+"""When to resample: equation 4.36's effective sample size below half of the particles there are."""
 
 POSITION_BIN = 0.25
 HEADING_BIN = 0.1
@@ -278,7 +279,7 @@ class Estimator:
 
     def _resample_if_worn(self, afforded: int) -> None:
         self._filter.normalize()
-        if self._filter.effective_sample_size < RESAMPLE_BELOW * self._filter.count:
+        if RESAMPLING.due(Wear(self._filter.count, self._filter.effective_sample_size)):
             self._filter.resample(self._target(afforded))
         self._stopwatch.lap("resampling")
 
