@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from filters.density.protocol import DensityMoments
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Columns = Sequence[Array]
@@ -125,18 +127,18 @@ class Grid:
         Returns
         -------
         (n,) int64
-            Flat indices; -1 outside the grid, and for a coordinate that is not finite.
+            Flat indices; -1 outside the grid.
 
         Raises
         ------
         ValueError
-            Points of another shape.
+            Points of another shape, or not finite.
         """
         given = checked_points("grid", points, self.dimension)
         flat = np.zeros(len(given), np.int64)
-        inside = np.isfinite(given).all(axis=1)
+        inside = np.ones(len(given), np.bool_)
         for axis, column, stride in zip(self.axes, given.T, self.strides, strict=True):
-            place = np.floor((np.where(inside, column, axis.low) - axis.low) / axis.width)
+            place = np.floor((column - axis.low) / axis.width)
             place = np.mod(place, axis.cells) if axis.wraps else place
             inside &= (place >= 0) & (place < axis.cells)
             flat += np.where(inside, place, 0.0).astype(np.int64) * stride
@@ -149,15 +151,17 @@ def checked_points(where: str, points: ArrayLike, dimension: int) -> Array:
     Raises
     ------
     ValueError
-        Another shape.
+        Another shape, or a number that is not finite.
     """
     given = np.asarray(points, np.float64)
     if given.ndim != 2 or given.shape[1] != dimension:
         raise ValueError(f"{where}: points must be (n, {dimension}), got {given.shape}")
+    if not np.isfinite(given).all():
+        raise ValueError(f"{where}: every coordinate of a point must be finite, got NaN or infinity")
     return given
 
 
-def box_moments(centres: Columns, widths: Columns, masses: Array, periods: Array) -> tuple[Array, Array]:
+def box_moments(centres: Columns, widths: Columns, masses: Array, periods: Array) -> DensityMoments:
     """Mean and covariance of a density that is constant in each of many boxes (eq. 4.2).
 
     An axis with a finite period is circular: its mean is the direction of the mean of exp(i x), each box
@@ -174,10 +178,9 @@ def box_moments(centres: Columns, widths: Columns, masses: Array, periods: Array
 
     Returns
     -------
-    mean : (dimension,) float64
-        On a circular axis in [-period / 2, period / 2].
-    covariance : (dimension, dimension) float64
-        With the boxes' own variance, width² / 12.
+    DensityMoments
+        The mean of a circular axis lies within half a period of zero; the covariance has the boxes' own
+        variance, width² / 12, in it.
     """
     share = masses / masses.sum()
     mean, offsets = np.zeros(len(centres)), np.zeros((len(centres), share.size))
@@ -193,4 +196,4 @@ def box_moments(centres: Columns, widths: Columns, masses: Array, periods: Array
             offsets[k] -= period * np.round(offsets[k] / period)
     covariance = (offsets * share) @ offsets.T
     covariance += np.diag([float(share @ width**2) / 12.0 for width in widths])
-    return mean, covariance
+    return DensityMoments(mean, covariance)

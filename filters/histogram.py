@@ -18,7 +18,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from filters.cells import CellMean, Cells, Nodes, log_mean
+from filters.cells import CellMean, Cells, log_mean
+from filters.density.protocol import DensityMoments
 from filters.grid import MOST_AXES, Array, Columns, Grid, Indices, LogDensity, box_moments
 from filters.kernels import histogram as kernels
 
@@ -70,6 +71,7 @@ class HistogramFilter:
         self._nodes = self._cells.nodes(grid.dimension)
         self._belief: Array = np.full(grid.shape, 1.0 / grid.size)
         self._spare: Array = np.empty(grid.shape)
+        self._every: Indices = np.arange(grid.size)
         golden = 0.5 * (math.sqrt(5.0) - 1.0)
         spaced = np.mod(np.arange(1, min(REST_SAMPLE, grid.size) + 1) * golden, 1.0)
         self._sample: Indices = np.unique((spaced * grid.size).astype(np.int64))
@@ -164,34 +166,44 @@ class HistogramFilter:
     def _move_by_axes(
         self, moved: list[Array], order: list[int], sigmas: Array, chosen: Indices
     ) -> tuple[Array, float]:
+        """Move along one axis after the other.
+
+        The array is laid out anew for each: first the axes that steer it, then itself, then the rest, which
+        all move alike.
+        """
         source, rest = self._belief, None
         if chosen.size < self.grid.size:
             rest = self._belief.copy()
-            rest.ravel()[chosen] = 0.0
+            rest.reshape(-1)[chosen] = 0.0
             source = self._belief - rest
         departed = 0.0
+        layout = list(range(self.grid.dimension))
         for axis in order:
-            source, left = self._move_along(source, axis, moved[axis], float(sigmas[axis]))
+            steering = [k for k in layout if k != axis and moved[axis].shape[k] > 1]
+            wanted = [*steering, axis, *(k for k in layout if k != axis and k not in steering)]
+            source = np.ascontiguousarray(source.transpose([layout.index(k) for k in wanted]))
+            layout = wanted
+            source, left = self._move_along(source, layout, axis, moved[axis], float(sigmas[axis]))
             departed += left
+        source = np.ascontiguousarray(source.transpose(np.argsort(layout)))
         return (source if rest is None else source + rest), departed
 
-    def _move_along(self, source: Array, axis: int, moved: Array, sigma: float) -> tuple[Array, float]:
-        """Move along one axis, each line of cells across it by its own distance."""
-        others = [k for k in range(self.grid.dimension) if k != axis]
-        steering = [k for k in others if moved.shape[k] > 1]
-        layout = [*steering, axis, *(k for k in others if k not in steering)]
-        lines = math.prod(self.grid.shape[k] for k in steering)
+    def _move_along(
+        self, source: Array, layout: list[int], axis: int, moved: Array, sigma: float
+    ) -> tuple[Array, float]:
         cells = self.grid.shape[axis]
-        shape = tuple(cells if k == axis else moved.shape[k] for k in range(moved.ndim))
+        shape = tuple(cells if k == axis else size for k, size in enumerate(moved.shape))
         means = np.broadcast_to(moved, shape).transpose(layout).reshape(-1)
+        lines = means.size // cells
         places, shares = self._targets(axis, means, sigma)
-        arranged = np.ascontiguousarray(source.transpose(layout)).reshape(lines, cells, -1)
-        target = np.empty_like(arranged)
+        target = np.empty_like(source)
         departed = kernels.spread(
-            arranged, places.reshape(lines, cells, -1), shares.reshape(lines, cells, -1), target
+            source.reshape(lines, cells, -1),
+            places.reshape(lines, cells, -1),
+            shares.reshape(lines, cells, -1),
+            target.reshape(lines, cells, -1),
         )
-        shape = tuple(self.grid.shape[k] for k in layout)
-        return np.ascontiguousarray(target.reshape(shape).transpose(np.argsort(layout))), departed
+        return target, departed
 
     def _move_by_cells(self, move: Move, sigmas: Array, chosen: Indices) -> tuple[Array, float]:
         target = self._belief.copy()
@@ -245,14 +257,14 @@ class HistogramFilter:
         moved = [np.asarray(column, np.float64) for column in move(states)]
         shape = np.broadcast_shapes(*(state.shape for state in states))
         if len(moved) != self.grid.dimension:
-            raise ValueError(
-                f"histogram motion: {self.grid.dimension} columns are needed, got {len(moved)}"
-            )
+            raise ValueError(f"histogram motion: {self.grid.dimension} columns are needed, got {len(moved)}")
         for column in moved:
             if np.broadcast_shapes(column.shape, shape) != shape:
                 raise ValueError(f"histogram motion: columns of {shape} are needed, got {column.shape}")
             if not np.isfinite(column).all():
-                raise ValueError("histogram motion: every state must move to a finite one, got NaN or infinity")
+                raise ValueError(
+                    "histogram motion: every state must move to a finite one, got NaN or infinity"
+                )
         return [column.reshape((1,) * (len(shape) - column.ndim) + column.shape) for column in moved]
 
     def _checked_sigma(self, sigma: ArrayLike) -> Array:
@@ -288,19 +300,24 @@ class HistogramFilter:
             NaN or plus infinity among the log likelihoods, or a shape that does not fit; the belief is
             unchanged then.
         """
-        if self.share == 0.0:
+        chosen = self._chosen()
+        if chosen.size == self.grid.size:
             return self._weigh_all(log_likelihood)
-        return self._weigh_chosen(log_likelihood, self._chosen())
+        return self._weigh_chosen(log_likelihood, chosen)
 
     def _weigh_all(self, log_likelihood: LogDensity) -> float:
         logs = log_mean(log_likelihood, self.grid.states(), self.grid.widths, self._nodes)
+        logs = logs.reshape((1,) * (self.grid.dimension - logs.ndim) + logs.shape)
         self.touched = self.grid.size
         top = float(logs.max())
         if top == -math.inf:
             return -math.inf
-        np.multiply(self._belief, np.exp(logs - top), out=self._spare)
-        total = float(self._spare.sum())
-        if total <= _SMALLEST:  # what is likely now was all but impossible before: weigh by logarithms
+        likelihood = np.exp(logs - top)
+        alike = tuple(k for k, size in enumerate(logs.shape) if size == 1)
+        total = float((self._belief.sum(axis=alike, keepdims=True) * likelihood).sum())
+        if total > _SMALLEST:
+            np.multiply(self._belief, likelihood / total, out=self._spare)
+        else:  # what is likely now was all but impossible before
             with np.errstate(divide="ignore"):
                 weighed = np.log(self._belief) + (logs - top)
             highest = float(weighed.max())
@@ -308,7 +325,7 @@ class HistogramFilter:
                 return -math.inf
             np.exp(weighed - highest, out=self._spare)
             top, total = top + highest, float(self._spare.sum())
-        np.divide(self._spare, total, out=self._spare)
+            np.divide(self._spare, total, out=self._spare)
         self._belief, self._spare = self._spare, self._belief
         return top + math.log(total)
 
@@ -344,13 +361,19 @@ class HistogramFilter:
     def _chosen(self) -> Indices:
         """Flat indices of the cells that are moved and weighed one by one."""
         if self.share == 0.0:
-            return np.arange(self.grid.size)
+            return self._every
         return np.flatnonzero(self._belief > self.share * self._belief.max())
 
     # --- what the belief says -----------------------------------------------------------------------------------
 
     def evaluate(self, points: ArrayLike) -> Array:
-        """Density at points, (n, dimension), by equation 4.2; 0 outside the grid."""
+        """Density at points, (n, dimension), by equation 4.2; 0 outside the grid.
+
+        Raises
+        ------
+        ValueError
+            Points of another shape, or not finite.
+        """
         cells = self.grid.cell_of(points)
         density = self._belief.reshape(-1)[np.maximum(cells, 0)] / self.grid.volume
         return np.where(cells < 0, 0.0, density)
@@ -370,8 +393,8 @@ class HistogramFilter:
         within = generator.random((count, self.grid.dimension)) - 0.5
         return np.column_stack(self.grid.states_at(cells)) + within * self.grid.widths
 
-    def moments(self) -> tuple[Array, Array]:
-        """Mean, (dimension,), and covariance, (dimension, dimension); circular along axes that wrap.
+    def moments(self) -> DensityMoments:
+        """Mean and covariance of the density; circular along axes that wrap.
 
         See :func:`filters.grid.box_moments`.
         """
@@ -414,6 +437,3 @@ def _order(moved: list[Array]) -> list[int]:
         order.append(min(free))
         remaining.remove(order[-1])
     return order
-
-
-__all__ = ["HistogramFilter", "Move", "Nodes"]
