@@ -39,10 +39,12 @@ LANES = 1024
 """Width of the kernel's scratch."""
 TRIALS = 3
 """Candidates for each new centre, of which the best is taken (greedy k-means++)."""
-LLOYD = 12
-REFINEMENTS = 6
+LLOYD = 8
+REFINEMENTS = 5
 PATIENCE = 2
 """How many values of k in a row may fail to raise the evidence before the search ends."""
+WIDE = 0.25
+"""Variance of an angle from which on some particles may lie near the far side of the circle."""
 FINE = 1e-3
 """Least deviation of a cluster that counts for its evidence, relative to the whole set's, if none is given."""
 
@@ -91,7 +93,7 @@ class Clusters:
         scales: ArrayLike | None = None,
         resolution: ArrayLike | None = None,
         least_weight: float = 0.01,
-        sample: int = 4096,
+        sample: int = 2048,
         seed: int = 0,
     ) -> None:
         size = len(circular)
@@ -236,7 +238,7 @@ class Clusters:
             )
             before, evidence = evidence, self._evidence(refined, effective, least)
             fit = refined
-            if abs(evidence - before) < 0.1:
+            if abs(evidence - before) < 0.5:
                 break
         return fit
 
@@ -283,8 +285,11 @@ class Clusters:
         factors = np.zeros((1, size, size), np.float32)
         constants = np.zeros(1, np.float32)
         centres = np.ascontiguousarray(columns[:, :1].T)
-        fit = self._gather(columns, weights, count, centres, factors, constants, centres)
-        if not (fit.weights[0] > 0.0 and np.isfinite(fit.covariances).all()):
+        few = self._some_weights.size
+        fit = self._gather(self._some, self._some_weights, few, centres, factors, constants, centres)
+        means = fit.means.astype(np.float32)
+        fit = self._gather(columns, weights, count, centres, factors, constants, means)
+        if not np.isfinite(fit.covariances).all():
             raise ValueError("clusters: particles must be finite, their weights with a positive finite sum")
         return self._about_its_means(columns, weights, count, fit, centres, factors, constants)
 
@@ -295,7 +300,7 @@ class Clusters:
         factors, constants = _metric(found, least)
         centres = found.means.astype(np.float32)
         fit = self._gather(columns, weights, count, centres, factors, constants, centres)
-        if len(fit.weights) < len(centres) or not (fit.covariances[:, self.circular, self.circular] > 0.1).any():
+        if len(fit.weights) < len(centres):
             return fit
         return self._about_its_means(columns, weights, count, fit, centres, factors, constants)
 
@@ -309,11 +314,11 @@ class Clusters:
         factors: Float32Array,
         constants: Float32Array,
     ) -> Fit:
-        """Gather again about the means: wide angles wrap elsewhere about them than about the centres."""
-        for _ in range(2):
-            means = fit.means.astype(np.float32)
-            fit = self._gather(columns, weights, count, centres, factors, constants, means)
-        return fit
+        """Gather again about the means if angles are wide: they wrap elsewhere about them than about the centres."""
+        if not (fit.covariances[:, self.circular, self.circular] > WIDE).any():
+            return fit
+        means = fit.means.astype(np.float32)
+        return self._gather(columns, weights, count, centres, factors, constants, means)
 
     def _gather(
         self,

@@ -2,7 +2,8 @@
 
 Distances are z'z with z = F (x - centre), F lower triangular: a scaling for k-means, the inverse root of a
 cluster's covariance for its refinement. They run block by block over rows of scratch in the first-level cache,
-so that every inner loop vectorises. Sums are float64.
+so that every inner loop vectorises. Second moments are summed in float64; first moments, which only steer the
+search, in float32 registers over a block.
 """
 
 from __future__ import annotations
@@ -115,16 +116,25 @@ def first_moments(
     sums: Float64Array,
 ) -> None:
     """Add to each cluster's row of ``sums``: Σ w, then Σ w d for every dimension, d the way from the centre."""
-    for i in range(first, last):
-        k = labels[i - first]
-        weight = weights[i]
-        row = sums[k]
-        row[0] += weight
+    heavy = weights[first:last]
+    for k in range(centres.shape[0]):
+        total = float32(0.0)
+        for i in range(last - first):
+            total += heavy[i] if labels[i] == k else float32(0.0)
+        sums[k, 0] += total
         for j in range(centres.shape[1]):
-            away = float32(columns[j, i] - centres[k, j])
+            row = columns[j, first:last]
+            centre = centres[k, j]
+            total = float32(0.0)
             if circular[j]:
-                away = wrapped(away)
-            row[1 + j] += weight * away
+                for i in range(last - first):
+                    weight = heavy[i] if labels[i] == k else float32(0.0)
+                    total += weight * wrapped(float32(row[i] - centre))
+            else:
+                for i in range(last - first):
+                    weight = heavy[i] if labels[i] == k else float32(0.0)
+                    total += weight * float32(row[i] - centre)
+            sums[k, 1 + j] += total
 
 
 @kernel(
@@ -144,7 +154,8 @@ def second_moments(
 ) -> None:
     """Add to each cluster's row of ``sums``: Σ w; Σ w d; Σ w sin d and Σ w cos d; Σ w d dᵀ, its lower triangle.
 
-    The places: 1, d, d, d, d (d + 1) / 2 for d dimensions. Sine and cosine only where a dimension wraps.
+    The places: 1, d, d, d, d (d + 1) / 2 for d dimensions. Sine and cosine only where a dimension wraps; angles
+    lie in [-pi, pi].
     ``away``: room for d numbers.
     """
     size = centres.shape[1]
@@ -157,7 +168,10 @@ def second_moments(
         for j in range(size):
             step = float(columns[j, i]) - float(centres[k, j])
             if circular[j]:
-                step -= TURN * math.floor(step / TURN + 0.5)
+                if step > math.pi:
+                    step -= TURN
+                elif step < -math.pi:
+                    step += TURN
                 s, c = sincos(float32(step))
                 row[1 + size + j] += weight * s
                 row[1 + 2 * size + j] += weight * c
