@@ -56,10 +56,13 @@ class GridGeometry:
 
     def cells(self, north: ArrayLike, east: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Row and column of places, as real numbers: the whole part is the cell, if it lies in the grid."""
-        row = np.asarray(north, np.float64) - np.float64(self.north)
-        column = np.asarray(east, np.float64) - np.float64(self.east)
-        scale = np.float64(self.resolution)
-        return np.asarray(row / scale, np.float64), np.asarray(column / scale, np.float64)
+        row: NDArray[np.float64] = np.array(north, np.float64)
+        column: NDArray[np.float64] = np.array(east, np.float64)
+        row -= self.north
+        column -= self.east
+        row /= self.resolution
+        column /= self.resolution
+        return row, column
 
     def centres(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """North of each row's middle, (rows,), and east of each column's, (columns,), metres."""

@@ -209,8 +209,8 @@ class OccupancyGrid:
         lengths = np.empty(angle.size)
         raycast.cast(
             np.ascontiguousarray(self.blocked(threshold)).view(np.uint8),
-            np.broadcast_to(row, angle.shape).ravel(),
-            np.broadcast_to(column, angle.shape).ravel(),
+            np.broadcast_to(row, angle.shape).flatten(),
+            np.broadcast_to(column, angle.shape).flatten(),
             np.cos(angle).ravel(),
             np.sin(angle).ravel(),
             reach,
