@@ -65,7 +65,7 @@ class Axis:
     @property
     def centres(self) -> Array:
         """Mean state of each cell (eq. 4.3), (cells,)."""
-        return self.low + (np.arange(self.cells) + 0.5) * self.width
+        return self.low + (np.arange(self.cells, dtype=np.float64) + 0.5) * self.width
 
 
 def circle(cells: int) -> Axis:

@@ -13,23 +13,16 @@ if the measurements begin to speak for it, its cells rise over the threshold aga
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from filters.cells import CellMean, Cells, log_mean
 from filters.density.protocol import DensityMoments
-from filters.grid import MOST_AXES, Array, Columns, Grid, Indices, LogDensity, box_moments
-from filters.kernels import histogram as kernels
+from filters.grid import Array, Grid, Indices, LogDensity, box_moments
+from filters.grid_motion import GridMotion, Move
 
-Move = Callable[[Columns], Sequence[ArrayLike]]
-"""Where states move without noise: columns in, columns out; what is returned broadcasts against the states."""
-
-TAIL = 7.0
-"""Standard deviations of the motion's noise that are followed; beyond lie 3e-12, dealt to the cells within."""
-
-BLOCK = 16_384
 REST_SAMPLE = 4_096
 _SMALLEST = 1e-200
 
@@ -67,8 +60,9 @@ class HistogramFilter:
         self.share = share
         self.departed = 0.0
         self.touched = 0
-        self._cells = CellMean() if cells is None else cells
-        self._nodes = self._cells.nodes(grid.dimension)
+        rule = CellMean() if cells is None else cells
+        self._motion = GridMotion(grid, rule)
+        self._nodes = rule.nodes(grid.dimension)
         self._belief: Array = np.full(grid.shape, 1.0 / grid.size)
         self._spare: Array = np.empty(grid.shape)
         self._every: Indices = np.arange(grid.size)
@@ -122,14 +116,13 @@ class HistogramFilter:
     def predict(self, move: Move, sigma: ArrayLike) -> float:
         """Move the belief: state = move(state) + Gaussian noise, independent along the axes.
 
-        Where the rule has one node for a cell and the axes can be ordered so that none is moved by one moved
-        before it, they are moved one after the other, which costs the sum of their windows in place of the
-        product; the result is the same. Of a selective filter only the chosen cells are moved.
+        Of a selective filter only the chosen cells are moved. See :class:`filters.grid_motion.GridMotion`.
 
         Parameters
         ----------
         move : callable
-            Takes the states as columns, one array for each axis, and returns them as they are without noise.
+            Takes the states as columns, one array for each axis that broadcast against each other; returns
+            them as they are without noise.
         sigma : (dimension,) array
             Standard deviation of the noise along each axis; 0 for none.
 
@@ -142,18 +135,11 @@ class HistogramFilter:
         Raises
         ------
         ValueError
-            A sigma negative or not finite, or a motion that gives a number that is not finite or another
-            number of columns; the belief is unchanged then.
+            A sigma negative or not finite, or a motion that gives a number that is not finite or columns that
+            do not fit; the belief is unchanged then.
         """
-        sigmas = self._checked_sigma(sigma)
         chosen = self._chosen()
-        reach = np.array([self._window(k, sigma) for k, sigma in enumerate(sigmas)])
-        moved = self._moved(move, self.grid.states()) if len(self._nodes.weights) == 1 else []
-        order = _order(moved)
-        if order and reach.sum() * self.grid.size <= reach.prod() * chosen.size:
-            target, departed = self._move_by_axes(moved, order, sigmas, chosen)
-        else:
-            target, departed = self._move_by_cells(move, sigmas, chosen)
+        target, departed = self._motion.carry(self._belief, chosen, move, sigma)
         self.touched = chosen.size
         total = float(target.sum())
         if total <= _SMALLEST:
@@ -162,119 +148,6 @@ class HistogramFilter:
         self._belief = target
         self.departed += (1.0 - self.departed) * departed
         return departed
-
-    def _move_by_axes(
-        self, moved: list[Array], order: list[int], sigmas: Array, chosen: Indices
-    ) -> tuple[Array, float]:
-        """Move along one axis after the other.
-
-        The array is laid out anew for each: first the axes that steer it, then itself, then the rest, which
-        all move alike.
-        """
-        source, rest = self._belief, None
-        if chosen.size < self.grid.size:
-            rest = self._belief.copy()
-            rest.reshape(-1)[chosen] = 0.0
-            source = self._belief - rest
-        departed = 0.0
-        layout = list(range(self.grid.dimension))
-        for axis in order:
-            steering = [k for k in layout if k != axis and moved[axis].shape[k] > 1]
-            wanted = [*steering, axis, *(k for k in layout if k != axis and k not in steering)]
-            source = np.ascontiguousarray(source.transpose([layout.index(k) for k in wanted]))
-            layout = wanted
-            source, left = self._move_along(source, layout, axis, moved[axis], float(sigmas[axis]))
-            departed += left
-        source = np.ascontiguousarray(source.transpose(np.argsort(layout)))
-        return (source if rest is None else source + rest), departed
-
-    def _move_along(
-        self, source: Array, layout: list[int], axis: int, moved: Array, sigma: float
-    ) -> tuple[Array, float]:
-        cells = self.grid.shape[axis]
-        shape = tuple(cells if k == axis else size for k, size in enumerate(moved.shape))
-        means = np.broadcast_to(moved, shape).transpose(layout).reshape(-1)
-        lines = means.size // cells
-        places, shares = self._targets(axis, means, sigma)
-        target = np.empty_like(source)
-        departed = kernels.spread(
-            source.reshape(lines, cells, -1),
-            places.reshape(lines, cells, -1),
-            shares.reshape(lines, cells, -1),
-            target.reshape(lines, cells, -1),
-        )
-        return target, departed
-
-    def _move_by_cells(self, move: Move, sigmas: Array, chosen: Indices) -> tuple[Array, float]:
-        target = self._belief.copy()
-        flat = target.reshape(-1)
-        flat[chosen] = 0.0
-        masses = self._belief.reshape(-1)[chosen]
-        departed = 0.0
-        for first in range(0, chosen.size, BLOCK):
-            block = slice(first, first + BLOCK)
-            centres = self.grid.states_at(chosen[block])
-            for offset, weight in zip(*self._nodes, strict=True):
-                steps = offset * self.grid.widths
-                moved = self._moved(move, [c + step for c, step in zip(centres, steps, strict=True)])
-                windows: list[NDArray[np.generic]] = []
-                for axis in range(MOST_AXES):
-                    windows += self._flat_targets(axis, moved, sigmas, masses[block].size)
-                departed += kernels.scatter(weight * masses[block], *windows, flat)
-        return target, departed
-
-    def _flat_targets(
-        self, axis: int, moved: list[Array], sigmas: Array, count: int
-    ) -> tuple[Indices, Array]:
-        if axis >= self.grid.dimension:
-            return np.zeros((count, 1), np.int64), np.ones((count, 1))
-        means = np.broadcast_to(moved[axis], (count,))
-        places, shares = self._targets(axis, means, float(sigmas[axis]))
-        return np.where(places < 0, -1, places * self.grid.strides[axis]), shares
-
-    def _targets(self, axis: int, means: Array, sigma: float) -> tuple[Indices, Array]:
-        """Return the cells along an axis around each mean, -1 beyond its ends, and their probabilities."""
-        along = self.grid.axes[axis]
-        nearest = np.floor((means - along.low) / along.width)
-        window = self._window(axis, sigma)
-        offsets = np.arange(window) - window // 2
-        excess = means - along.low - nearest * along.width
-        nearest = np.mod(nearest, along.cells) if along.wraps else np.clip(nearest, -1e9, 1e9)
-        places = nearest.astype(np.int64)[:, None] + offsets
-        if along.wraps:
-            places %= along.cells
-        else:
-            places[(places < 0) | (places >= along.cells)] = -1
-        if window == 1:
-            return places, np.ones((means.size, 1))
-        distances = (offsets + 0.5) * along.width - excess[:, None]
-        return places, self._cells.shares(distances, along.width, sigma)
-
-    def _window(self, axis: int, sigma: float) -> int:
-        return 2 * math.ceil(TAIL * sigma / self.grid.axes[axis].width) + 1
-
-    def _moved(self, move: Move, states: list[Array]) -> list[Array]:
-        moved = [np.asarray(column, np.float64) for column in move(states)]
-        shape = np.broadcast_shapes(*(state.shape for state in states))
-        if len(moved) != self.grid.dimension:
-            raise ValueError(f"histogram motion: {self.grid.dimension} columns are needed, got {len(moved)}")
-        for column in moved:
-            if np.broadcast_shapes(column.shape, shape) != shape:
-                raise ValueError(f"histogram motion: columns of {shape} are needed, got {column.shape}")
-            if not np.isfinite(column).all():
-                raise ValueError(
-                    "histogram motion: every state must move to a finite one, got NaN or infinity"
-                )
-        return [column.reshape((1,) * (len(shape) - column.ndim) + column.shape) for column in moved]
-
-    def _checked_sigma(self, sigma: ArrayLike) -> Array:
-        sigmas = np.array(sigma, np.float64, ndmin=1)
-        if sigmas.shape != (self.grid.dimension,) or not np.isfinite(sigmas).all() or (sigmas < 0.0).any():
-            raise ValueError(
-                f"histogram motion: sigma must be {self.grid.dimension} finite numbers, not negative, got "
-                f"{sigmas.tolist()}"
-            )
-        return sigmas
 
     # --- measurement, line 4 of Table 4.1 -----------------------------------------------------------------------
 
@@ -388,8 +261,8 @@ class HistogramFilter:
         """
         if count < 0:
             raise ValueError(f"histogram filter: count must not be negative, got {count}")
-        cumulative = self._belief.cumsum()
-        cells = np.searchsorted(cumulative, generator.random(count) * cumulative[-1], side="right")
+        cumulative: Array = self._belief.cumsum()
+        cells: Indices = np.searchsorted(cumulative, generator.random(count) * cumulative[-1], side="right")
         within = generator.random((count, self.grid.dimension)) - 0.5
         return np.column_stack(self.grid.states_at(cells)) + within * self.grid.widths
 
@@ -423,17 +296,3 @@ class HistogramFilter:
                 f"histogram filter: axes must be among 0 to {self.grid.dimension - 1}, got {tuple(axes)}"
             )
         return self._belief.sum(axis=tuple(k for k in range(self.grid.dimension) if k not in kept))
-
-
-def _order(moved: list[Array]) -> list[int]:
-    """Order the axes so that none that is still to be moved depends on one already moved; empty if impossible."""
-    remaining, order = set(range(len(moved))), list[int]()
-    while remaining:
-        free = [
-            k for k in remaining if not any(moved[other].shape[k] > 1 for other in remaining if other != k)
-        ]
-        if not free:
-            return []
-        order.append(min(free))
-        remaining.remove(order[-1])
-    return order

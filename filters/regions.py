@@ -202,4 +202,5 @@ class Partition:
 
     def _sums(self, values: Array) -> Array:
         flat = self._labels.reshape(-1)
-        return np.bincount(flat[flat >= 0], values[flat >= 0], len(self.regions))
+        sums: Array = np.bincount(flat[flat >= 0], values[flat >= 0], len(self.regions)).astype(np.float64)
+        return sums

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from filters.grid import Array, Columns
+from filters.grid import Array
+from filters.grid_motion import Move
 from filters.kernels import density_tree as kernels
 from filters.tree_nodes import Sides, TreeNodes
 
 ROUNDS = 12
 """How often a leaf may be halved before it is carried."""
-
-Move = Callable[[Columns], Sequence[ArrayLike]]
 
 
 def carried(
@@ -74,7 +71,8 @@ def carried(
             np.empty(arena),
         )
         if count > 0:
-            return TreeNodes(*(column[:count] for column in nodes))
+            low, high, axis, child, mass = nodes
+            return TreeNodes(low[:count], high[:count], axis[:count], child[:count], mass[:count])
         if count == -1:
             capacity *= 2
         else:

@@ -85,7 +85,8 @@ class Sides:
 
     def inside(self, points: Array) -> Mask:
         """Say which points, folded, lie in the box."""
-        return ((points >= self.low) & (points < self.high)).all(axis=1)
+        outside = (points < self.low) | (points >= self.high)
+        return outside.sum(axis=1) == 0
 
     def axes_to_cut(self, widths: Array, heavy: Mask) -> Indices:
         """Say along which axis boxes are cut: the widest in units of the finest, if heavy.

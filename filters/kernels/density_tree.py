@@ -69,7 +69,7 @@ def _cumulative(x: float, mean: float, half: float, sigma: float, period: float)
     """
     if period == 0.0:
         return _below(x - mean, half, sigma)
-    turns = int(math.ceil((half + TAIL * sigma) / period)) + 1
+    turns = math.ceil((half + TAIL * sigma) / period) + 1
     total = 0.0
     for turn in range(-turns, turns + 1):
         total += _below(x - mean - turn * period, half, sigma)
@@ -93,6 +93,65 @@ def _axis_to_cut(
             if excess > largest:
                 chosen, largest = k, excess
     return chosen
+
+
+@function
+def _reach(
+    masses: Float64Array,
+    means: Float64Array,
+    halves: Float64Array,
+    sigma: Float64Array,
+    periods: Float64Array,
+    low: Float64Array,
+    high: Float64Array,
+    mass: Float64Array,
+    source: Int64Array,
+    lower: Float64Array,
+    upper: Float64Array,
+) -> int:
+    """Note which sources reach the root, and sum their probability in it; return how many they are."""
+    used = 0
+    total = 0.0
+    for i in range(masses.size):
+        p = masses[i]
+        for k in range(low.shape[1]):
+            lower[used, k] = _cumulative(low[0, k], means[i, k], halves[i, k], sigma[k], periods[k])
+            upper[used, k] = _cumulative(high[0, k], means[i, k], halves[i, k], sigma[k], periods[k])
+            p *= upper[used, k] - lower[used, k]
+        if p > 0.0:
+            source[used] = i
+            used += 1
+            total += p
+    mass[0] = total
+    return used
+
+
+@function
+def _half(
+    entry: int,
+    top: int,
+    along: int,
+    side: int,
+    masses: Float64Array,
+    source: Int64Array,
+    lower: Float64Array,
+    upper: Float64Array,
+    middles: Float64Array,
+) -> float:
+    """Copy an entry of the arena to its top, for one half of the box; return its probability, 0 if none."""
+    i = source[entry]
+    mass = float(masses[i])
+    share = 1.0
+    for k in range(lower.shape[1]):
+        lower[top, k] = lower[entry, k]
+        upper[top, k] = upper[entry, k]
+        if k == along and side == 0:
+            upper[top, k] = middles[entry]
+        if k == along and side == 1:
+            lower[top, k] = middles[entry]
+        share *= float(upper[top, k] - lower[top, k])
+    source[top] = i
+    return mass * share if share > _NOTHING else 0.0
 
 
 @kernel(
@@ -129,21 +188,9 @@ def grow(
     ``middles``) that grows and shrinks like the ``stack``: a cut costs one new number for each source.
     Returns how many nodes there are; -1 if they do not fit, -2 if the arena or the stack is too small.
     """
-    dimension = low.shape[1]
-    used = 0
-    total = 0.0
-    for i in range(masses.size):
-        p = masses[i]
-        for k in range(dimension):
-            lower[used, k] = _cumulative(low[0, k], means[i, k], halves[i, k], sigma[k], periods[k])
-            upper[used, k] = _cumulative(high[0, k], means[i, k], halves[i, k], sigma[k], periods[k])
-            p *= upper[used, k] - lower[used, k]
-        if p > 0.0:
-            source[used] = i
-            used += 1
-            total += p
+    used = _reach(masses, means, halves, sigma, periods, low, high, mass, source, lower, upper)
+    total = mass[0]
     nodes = 1
-    mass[0] = total
     axis[0] = -1
     stack[0, 0], stack[0, 1], stack[0, 2] = 0, 0, used
     depth = 1
@@ -170,33 +217,20 @@ def grow(
         for side in range(2):
             new = nodes + side
             axis[new] = -1
-            for k in range(dimension):
-                low[new, k] = low[node, k]
-                high[new, k] = high[node, k]
+            low[new] = low[node]
+            high[new] = high[node]
             if side == 0:
                 high[new, along] = middle
             else:
                 low[new, along] = middle
-            begin = top
-            kept = 0.0
+            stack[depth, 0], stack[depth, 1] = new, top
+            mass[new] = 0.0
             for entry in range(first, end):
-                i = source[entry]
-                for k in range(dimension):
-                    lower[top, k] = lower[entry, k]
-                    upper[top, k] = upper[entry, k]
-                if side == 0:
-                    upper[top, along] = middles[entry]
-                else:
-                    lower[top, along] = middles[entry]
-                p = masses[i]
-                for k in range(dimension):
-                    p *= upper[top, k] - lower[top, k]
-                if p > _NOTHING * masses[i]:
-                    source[top] = i
+                p = _half(entry, top, along, side, masses, source, lower, upper, middles)
+                if p > 0.0:
+                    mass[new] += p
                     top += 1
-                    kept += p
-            mass[new] = kept
-            stack[depth, 0], stack[depth, 1], stack[depth, 2] = new, begin, top
+            stack[depth, 2] = top
             depth += 1
         nodes += 2
     return nodes
