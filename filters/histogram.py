@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -262,7 +263,8 @@ class HistogramFilter:
         if count < 0:
             raise ValueError(f"histogram filter: count must not be negative, got {count}")
         cumulative: Array = self._belief.cumsum()
-        cells: Indices = np.searchsorted(cumulative, generator.random(count) * cumulative[-1], side="right")
+        uniform = generator.random(count) * cumulative[-1]
+        cells = cast(Indices, cumulative.searchsorted(uniform, side="right"))
         within = generator.random((count, self.grid.dimension)) - 0.5
         return np.column_stack(self.grid.states_at(cells)) + within * self.grid.widths
 
