@@ -30,6 +30,9 @@ from service.wiring import Wiring
 START_LIMIT = 5
 """Failed starts in a row of the vital process after which the service gives up."""
 
+WATCHDOG_MARGIN = 2.0
+"""Seconds by which systemd is at least more patient with the service than the service is with the loop."""
+
 STATUS_PERIOD = 1.0
 UNREAD = 5.0
 """Seconds that the publisher may leave its queue full before it counts as hung."""
@@ -225,11 +228,13 @@ class Supervisor:
             self._status_due = now
             _log.info("%s: running, process %s", child.program.name, child.pid)
         if child.program.vital:
-            self._pass_on_beat(was_running)
+            self._pass_on_beat(child, was_running)
 
-    def _pass_on_beat(self, was_running: bool) -> None:
+    def _pass_on_beat(self, child: Child, was_running: bool) -> None:
         if not was_running and self._notifier.watchdog_period:
-            self._notifier.watchdog_within(self._notifier.watchdog_period)
+            # the loop that hangs is ours to replace, before systemd replaces all
+            patience = max(self._notifier.watchdog_period, child.program.patience + WATCHDOG_MARGIN)
+            self._notifier.watchdog_within(patience)
         if not self._ready:
             self._ready = True
             self._notifier.ready()

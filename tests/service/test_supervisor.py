@@ -351,6 +351,11 @@ def test_a_link_that_is_taken_out_while_it_waits_is_forgotten(start: Start) -> N
     assert set(after) == {"supervisor", "publisher", "loop"}
 
 
+def test_systemd_is_more_patient_than_the_supervisor(start: Start) -> None:
+    service = start(PUBLISHER, LOOP | {"patience": 4.0}, LINK, environment={"WATCHDOG_USEC": "3000000"})
+    assert service.hear("WATCHDOG_USEC=6")[-1] == "WATCHDOG_USEC=6000000", "once the loop beats"
+
+
 def test_systemd_waits_through_the_back_off_of_the_loop(start: Start) -> None:
     """It grows to 5 s, beyond the watchdog: that must not end the service."""
     service = start(PUBLISHER, LOOP | {"manner": "die"}, LINK, environment={"WATCHDOG_USEC": "1000000"})

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from checks import (
+    PATIENCE,
     SERVICE,
     CheckError,
     Estimates,
@@ -104,7 +105,7 @@ class Vehicle:
 
     def stop(self) -> None:
         self._process.terminate()
-        self._process.wait(20)
+        self._process.wait(PATIENCE)
 
     def again(self) -> None:
         self.stop()
