@@ -8,6 +8,11 @@ quantile
     n = (k - 1) / (2 error) · (1 - 2 / (9 (k - 1)) + sqrt(2 / (9 (k - 1))) z)³
 
 and z is the standard normal *quantile* of the probability (2.326 for 0.99), not the probability.
+
+Fox draws particle by particle until there are as many as the bins touched so far ask for. Systematic resampling
+(Table 4.4) must know its count before its first draw, and its ancestors ascend, so bins cannot be counted on the way.
+So the two are done one after the other: :meth:`Demand.draws` makes Fox's draws without copying anything, which
+gives the count, and the set is then resampled to it.
 """
 
 from __future__ import annotations
@@ -19,7 +24,7 @@ from typing import Protocol
 
 import numpy as np
 
-from filters.kernels.bins import occupied
+from filters.kernels.bins import draws_until_enough, occupied
 from filters.kernels.compile import Float32Array
 
 SAMPLE = 8192
@@ -132,6 +137,9 @@ class Demand:
         self._keys = np.zeros(4 * SAMPLE, np.int64)
         self._stamps = np.zeros(4 * SAMPLE, np.int32)
         self._stamp = 0
+        self._draw_keys = np.zeros(0, np.int64)
+        self._draw_stamps = np.zeros(0, np.int32)
+        self._draw_stamp = 0
 
     def bins(self, belief: Weighted) -> int:
         """Count occupied bins of (north, east, heading)."""
@@ -161,3 +169,59 @@ class Demand:
     def particles(self, belief: Weighted) -> int:
         """Say how many particles the belief needs, within the limits."""
         return min(self._maximum, bound(self.bins(belief), self._error, self._probability, self._minimum))
+
+    def draws(self, belief: Weighted, uniform: float) -> int:
+        """Say how many draws from the weighted set Fox's loop takes: count bins first, then resample to this.
+
+        Draw by draw, the bins touched are counted, until there are as many draws as the bound asks for. The draws are
+        spread over the weights as evenly as those of Table 4.4, from every first draw on. ``Demand.particles`` counts
+        the bins of the particles there are; this counts the bins of those that will be left.
+
+        Parameters
+        ----------
+        belief : Weighted
+            Weights need not be normalised.
+        uniform : float
+            The random number that starts the draws, in (0, 1].
+
+        Returns
+        -------
+        int
+            Within the limits; the minimum if all draws fall into one bin.
+
+        Raises
+        ------
+        ValueError
+            A uniform outside (0, 1], or weights whose sum is not positive and finite.
+        """
+        if not 0.0 < uniform <= 1.0:
+            raise ValueError(f"demand: uniform must lie in (0, 1], got {uniform}")
+        cumulative = np.cumsum(belief.weights, dtype=np.float64)
+        if cumulative.size == 0 or not 0.0 < cumulative[-1] < math.inf:
+            raise ValueError(f"demand: {cumulative.size} weights must have a positive finite sum")
+        self._make_room(min(self._maximum, belief.count))
+        drawn, _ = draws_until_enough(
+            belief.columns,
+            cumulative,
+            uniform,
+            self._per_metre,
+            self._per_metre,
+            self._per_radian,
+            self._minimum,
+            self._maximum,
+            self._error,
+            _quantile(self._probability),
+            self._draw_keys,
+            self._draw_stamps,
+            self._draw_stamp,
+        )
+        return drawn
+
+    def _make_room(self, bins: int) -> None:
+        """See that the table of the draws has at least twice as many places as there can be bins, and a new stamp."""
+        size = 1 << (2 * bins).bit_length()
+        if self._draw_keys.size < size or self._draw_stamp == 0x7FFFFFFF:
+            self._draw_keys = np.zeros(size, np.int64)
+            self._draw_stamps = np.zeros(size, np.int32)
+            self._draw_stamp = 0
+        self._draw_stamp += 1
