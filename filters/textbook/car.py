@@ -24,6 +24,7 @@ from filters.kernels.compile import Float32Array
 from filters.motion.slow import RandomWalk
 from filters.particle import ParticleFilter
 from filters.particle_set import ParticleSet
+from filters.textbook.error import root_mean_square
 from filters.textbook.projection import Projection, ProjectionMeasurement
 
 TRANSITION = np.array([[1.0, 1.0], [0.0, 1.0]])
@@ -110,8 +111,7 @@ def kalman() -> Gaussians:
         rows.append((belief.mean, belief.covariance))
     told = belief.correct([MEASURED], MODEL, [[NOISE]])
     rows.append((belief.mean, belief.covariance))
-    log_evidence = -0.5 * (told.nis + np.log(2.0 * np.pi * told.innovation_covariance[0, 0]))
-    return Gaussians(np.array([m for m, _ in rows]), np.array([c for _, c in rows]), float(log_evidence))
+    return Gaussians(np.array([m for m, _ in rows]), np.array([c for _, c in rows]), told.log_evidence)
 
 
 class Coasting(NamedTuple):
@@ -184,8 +184,8 @@ def convergence(repetitions: int = 30, counts: tuple[int, ...] = COUNTS) -> Conv
             [np.linalg.norm(run.covariances[-1] - exact.covariances[-1]) / size for run in runs]
         )
         evidence = np.array([run.log_evidence - exact.log_evidence for run in runs])
-        mahalanobis = np.einsum("ri,ij,rj->r", away, information, away)
-        errors[row] = np.sqrt((mahalanobis.mean(), np.mean(spread**2), np.mean(evidence**2)))
+        mahalanobis = np.sqrt(np.einsum("ri,ij,rj->r", away, information, away))
+        errors[row] = [root_mean_square(values) for values in (mahalanobis, spread, evidence)]
     return Convergence(np.array(counts), *errors.T)
 
 

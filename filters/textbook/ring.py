@@ -19,14 +19,18 @@ converges to it faster than any power (it is periodic), and is exact to float64 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from filters.extended_kalman import ExtendedKalmanFilter, Transition
+from filters.kalman import Expectation
 from filters.motion import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from filters.textbook import normal
+from filters.textbook.error import root_mean_square
 from filters.textbook.projection import Projection, ProjectionMeasurement
 
 VARIANCE = 0.01
@@ -139,6 +143,46 @@ def exact(measured: float = MEASURED) -> Position:
     return Position(np.array([np.zeros(2), mean]), np.array([prior, corrected]), math.log(evidence))
 
 
+class Forward:
+    """One metre in the direction of the heading, linearised at the mean, for the extended Kalman filter."""
+
+    names = ("x", "y", "heading")
+    angles = (2,)
+
+    def move(self, mean: NDArray[np.float64], control: None, duration: float) -> Transition:
+        """See :class:`filters.extended_kalman.LinearisedMotion`; there is no control, and no noise."""
+        del control
+        cosine, sine = duration * math.cos(mean[2]), duration * math.sin(mean[2])
+        jacobian = np.array([[1.0, 0.0, -sine], [0.0, 1.0, cosine], [0.0, 0.0, 1.0]])
+        return Transition(mean + np.array([cosine, sine, 0.0]), jacobian, np.zeros((3, 3)))
+
+
+class FirstCoordinate:
+    """The measurement of x for the extended Kalman filter; it is linear."""
+
+    def expect(
+        self, rows: Mapping[str, int], mean: NDArray[np.float64], measurement: ProjectionMeasurement
+    ) -> Expectation:
+        """See :class:`filters.extended_kalman.LinearisedSensor`."""
+        model = np.zeros((1, mean.size))
+        model[0, rows["x"]] = 1.0
+        return Expectation(np.array([measurement.x]), model @ mean, model, np.array([[NOISE]]))
+
+
+def extended(measured: float = MEASURED) -> Position:
+    """Exercise 2 by the extended Kalman filter: a line where the ring should be."""
+    belief = ExtendedKalmanFilter(Forward(), np.zeros(3), np.diag([VARIANCE, VARIANCE, HEADING_VARIANCE]))
+    belief.predict(None, 1.0)
+    predicted = belief.mean, belief.covariance
+    correction = belief.correct(FirstCoordinate(), ProjectionMeasurement(measured))
+    beliefs = (predicted, (belief.mean, belief.covariance))
+    return Position(
+        np.array([mean[:2] for mean, _ in beliefs]),
+        np.array([covariance[:2, :2] for _, covariance in beliefs]),
+        correction.log_evidence,
+    )
+
+
 def particles(count: int, seed: int, measured: float = MEASURED) -> Cloud:
     """Exercise 5: exercise 2 with ``count`` particles; the motion is the daemon's unicycle without noise."""
     belief, poses = _moved(count, seed)
@@ -162,8 +206,7 @@ def convergence(repetitions: int = 30, counts: tuple[int, ...] = COUNTS) -> Conv
         away = np.array([cloud.moments.means[1] - truth for cloud in clouds])
         upper = np.array([cloud.upper - 0.5 for cloud in clouds])
         lost = sum(_one_place_left(count, seed) for seed in range(repetitions)) / repetitions
-        square = float(np.mean(np.sum(away**2, axis=1)))
-        errors[row] = math.sqrt(square), math.sqrt(float(np.mean(upper**2))), lost
+        errors[row] = root_mean_square(np.linalg.norm(away, axis=1)), root_mean_square(upper), lost
     return Convergence(np.array(counts), *errors.T)
 
 
