@@ -18,7 +18,7 @@ from filters import chi_square
 
 Matrix = NDArray[np.float64]
 
-_LOG_TWO_PI = math.log(2.0 * math.pi)
+LOG_TWO_PI = math.log(2.0 * math.pi)
 
 
 class Correction(NamedTuple):
@@ -229,20 +229,23 @@ def corrected(
     nu = residual[measured]
     if nu.size == 0:
         return belief, Correction(nu, spread, 0.0, 0.0, accepted=True)
-    cross = h @ belief.covariance
-    innovation_covariance = symmetric(cross @ h.T + spread)
+    innovation_covariance = symmetric(h @ belief.covariance @ h.T + spread)
     root = np.linalg.cholesky(innovation_covariance)
     white = np.linalg.solve(root, nu)
     nis = float(white @ white)
-    log_evidence = -0.5 * (nis + nu.size * _LOG_TWO_PI) - float(np.log(np.diagonal(root)).sum())
+    log_evidence = -0.5 * (nis + nu.size * LOG_TWO_PI) - float(np.log(np.diagonal(root)).sum())
     accepted = gate is None or nis <= chi_square.quantile(gate, nu.size)
     correction = Correction(nu, innovation_covariance, nis, log_evidence, accepted)
     if not accepted:
         return belief, correction
-    gain = np.linalg.solve(innovation_covariance, cross).T
-    remaining = np.eye(belief.mean.size) - gain @ h
-    covariance = symmetric(remaining @ belief.covariance @ remaining.T + gain @ spread @ gain.T)
-    return Gaussian(belief.mean + gain @ nu, covariance), correction
+    gain = np.linalg.solve(innovation_covariance, h @ belief.covariance).T
+    return Gaussian(belief.mean + gain @ nu, joseph(belief.covariance, gain, h, spread)), correction
+
+
+def joseph(covariance: Matrix, gain: Matrix, observation: Matrix, noise: Matrix) -> Matrix:
+    """Return the covariance after a correction: (I - K H) C (I - K H)ᵀ + K Q Kᵀ, right for any gain K."""
+    remaining = np.eye(len(covariance)) - gain @ observation
+    return symmetric(remaining @ covariance @ remaining.T + gain @ noise @ gain.T)
 
 
 def wrap(values: Matrix, angles: Sequence[int]) -> None:

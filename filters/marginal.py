@@ -1,0 +1,540 @@
+"""The marginalised (Rao-Blackwellised) particle filter: particles for what is nonlinear, a Kalman filter for the rest.
+
+Schön, Gustafsson and Nordlund, "Marginalized particle filters for mixed linear/nonlinear state-space models", IEEE
+TSP 53(7), 2005, their triangular model (Model 2), a little widened. With nonlinear states x in the particles and states
+l that are linear and Gaussian once a particle's path is given::
+
+    v = a + A l + w,   w ~ N(0, Q)         the increment that the motion draws
+    x' = f(x, v)                           any function of each particle; Model 2 is x' = f(x) + v
+    l' = F l + d + r,  r ~ N(0, R)
+    z = h(x) + C l + e,  e ~ N(0, S)
+
+Each particle carries its own mean of l as columns. A, F and C are the same for all particles, and so is the covariance
+P of l: one matrix, whatever the number of particles. One step draws v with the uncertainty of l in it, takes the draw
+as a measurement of l, and moves::
+
+    V = A P Aᵀ + Q = L Lᵀ,   v = a + A l + L n,   l += P Aᵀ L⁻ᵀ n,   P = P - P Aᵀ V⁻¹ A P
+    x' = f(x, v),   l = F l + d,   P = F P Fᵀ + R
+
+A measurement weighs each particle by N(z; h(x) + C l, C P Cᵀ + S) and corrects its l by the Kalman gain that all share.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from filters import resampling
+from filters.belief import Evidence
+from filters.kalman import (
+    LOG_TWO_PI,
+    Matrix,
+    checked_gaussian,
+    joseph,
+    require_finite,
+    require_shape,
+    symmetric,
+    wrap,
+)
+from filters.kernels import marginal as kernels
+from filters.kernels import random, weights
+from filters.kernels.compile import Float32Array
+from filters.kernels.resampling import deal
+from filters.particle_set import ParticleSet
+from filters.sensing.model import Sensor
+
+Control = TypeVar("Control")
+ControlIn = TypeVar("ControlIn", contravariant=True)
+Measurement = TypeVar("Measurement", contravariant=True)
+M = TypeVar("M")
+
+_RESAMPLING_STREAM = 1 << 32
+_SINGULAR = 1e-12
+"""A pivot this much smaller than its variance is rounding: that direction of the increment is certain."""
+
+
+class MixedStep(NamedTuple):
+    """One prediction, for k increments and l linear states: the same numbers for every particle.
+
+    Attributes
+    ----------
+    offset : (k,) float64
+        a, the increment as far as the control says it.
+    coupling : (k, l) float64
+        A, the linear states' part in it.
+    noise : (k, k) float64
+        Q.
+    transition : (l, l) float64
+        F.
+    drift : (l,) float64
+        d.
+    linear_noise : (l, l) float64
+        R.
+    """
+
+    offset: Matrix
+    coupling: Matrix
+    noise: Matrix
+    transition: Matrix
+    drift: Matrix
+    linear_noise: Matrix
+
+
+class MixedMotion(Protocol[ControlIn]):
+    """The named requirement of a motion model."""
+
+    @property
+    def nonlinear(self) -> tuple[str, ...]:
+        """Columns that are sampled, the first rows of the particle set."""
+        ...
+
+    @property
+    def linear(self) -> tuple[str, ...]:
+        """Columns of the linear states' means, the rows that follow."""
+        ...
+
+    @property
+    def angles(self) -> tuple[int, ...]:
+        """Which of the nonlinear columns are angles, radians."""
+        ...
+
+    def begin(self, control: ControlIn, duration: float) -> MixedStep:
+        """Prepare one prediction over ``duration`` seconds."""
+        ...
+
+    def move(self, particles: ParticleSet, first: int, last: int, increments: Float32Array) -> None:
+        """Move the nonlinear columns of the particles ``first`` to ``last``: x' = f(x, v).
+
+        ``increments``, (k, >= last - first) float32, holds v; its column 0 belongs to particle ``first``.
+        """
+        ...
+
+
+class MixedObservation(NamedTuple):
+    """One measurement, the same for every particle.
+
+    Attributes
+    ----------
+    measured : (m,) float64
+        z; NaN among its components means that this one was not measured.
+    coupling : (m, l) float64
+        C.
+    noise : (m, m) float64
+        S.
+    angles : tuple of int
+        Components that are angles: their innovations are taken in [-pi, pi].
+    """
+
+    measured: Matrix
+    coupling: Matrix
+    noise: Matrix
+    angles: tuple[int, ...] = ()
+
+
+class MixedSensor(Protocol[Measurement]):
+    """The named requirement of a sensor model that sees linear states."""
+
+    def begin(self, measurement: Measurement) -> MixedObservation:
+        """Prepare one measurement."""
+        ...
+
+    def expect(
+        self, particles: ParticleSet, first: int, last: int, measurement: Measurement, expected: Float32Array
+    ) -> None:
+        """Write h(x) of the particles ``first`` to ``last`` into ``expected``, (m, >= last - first) float32.
+
+        Finite also where nothing was measured; its column 0 belongs to particle ``first``.
+        """
+        ...
+
+
+class MixedMoments(NamedTuple):
+    """First and second moments of the whole state.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Nonlinear dimensions, then linear ones.
+    mean : (n,) float64
+        Weighted; circular for angles.
+    covariance : (n, n) float64
+        Spread of the particles, plus P among the linear dimensions.
+    effective_sample_size : float
+        One over the sum of the squared normalised weights.
+    """
+
+    names: tuple[str, ...]
+    mean: Matrix
+    covariance: Matrix
+    effective_sample_size: float
+
+
+class MarginalFilter(Generic[Control]):
+    """Particles with a Kalman filter each, which share one covariance.
+
+    With no linear states it is the plain particle filter of Table 4.3; with no nonlinear ones it is the Kalman filter.
+
+    Parameters
+    ----------
+    motion : MixedMotion
+        It says what the columns are.
+    capacity : int
+        Most particles that there can be; allocated here, once.
+    seed : int
+        Of all its random numbers.
+    block : int
+        Particles that are worked on at a time.
+
+    Attributes
+    ----------
+    covariance : (l, l) float64
+        P, of the linear states given any particle's path.
+    collapses : int
+        How often no particle could explain what was measured.
+
+    Raises
+    ------
+    ValueError
+        A capacity or block below 1, no dimensions, or a name that occurs twice.
+    """
+
+    def __init__(
+        self, motion: MixedMotion[Control], capacity: int, seed: int = 0, block: int = 32_768
+    ) -> None:
+        if capacity < 1 or block < 1:
+            raise ValueError(
+                f"marginal filter: capacity and block must be at least 1, got {capacity} and {block}"
+            )
+        self.names = (*motion.nonlinear, *motion.linear)
+        if not self.names or len(set(self.names)) < len(self.names):
+            raise ValueError(f"marginal filter: different names are needed, got ({', '.join(self.names)})")
+        self._motion = motion
+        self._sampled = len(motion.nonlinear)
+        self._seed = seed
+        self._block = min(block, capacity)
+        self._step = 0
+        self._draws = 0
+        self._particles = ParticleSet(self.names, capacity)
+        self._spare: Float32Array = np.zeros_like(self._particles.columns)
+        self._weights: Float32Array = np.zeros(capacity, np.float32)
+        self._places = np.arange(capacity, dtype=np.int32)
+        self._bounds: list[tuple[int, int]] = []
+        self._sums = np.zeros(2)
+        self.covariance: Matrix = np.zeros((len(motion.linear), len(motion.linear)))
+        self.collapses = 0
+
+    @property
+    def count(self) -> int:
+        """How many particles there are; 0 before :meth:`initialize`."""
+        return self._particles.count
+
+    @property
+    def effective_sample_size(self) -> float:
+        """1 / Σ w² of the normalised weights (eq. 4.36)."""
+        return float(self._sums[0] ** 2 / self._sums[1])
+
+    @property
+    def weights(self) -> Float32Array:
+        """View of the weights, (count,) float32, relative to the largest."""
+        return self._weights[: self.count]
+
+    def column(self, name: str) -> Float32Array:
+        """View of one dimension, (count,) float32: samples of a nonlinear one, means of a linear one.
+
+        It is valid until the next :meth:`resample`.
+
+        Raises
+        ------
+        KeyError
+            There is no dimension of that name.
+        """
+        return self._particles.columns[self._particles.row(name), : self.count]
+
+    def initialize(self, columns: Mapping[str, ArrayLike], covariance: ArrayLike) -> None:
+        """Start from given particles, equally weighted.
+
+        Parameters
+        ----------
+        columns : mapping of str to (count,) array or a number
+            Every dimension by name; a number stands for all particles, and one at least must be an array.
+        covariance : (l, l) array
+            P, of the linear states about each particle's means.
+
+        Raises
+        ------
+        ValueError
+            A dimension missing or unknown, lengths that differ, a length of 0 or above the capacity, a value that
+            is not finite, or a covariance that is none.
+        """
+        if set(columns) != set(self.names):
+            raise ValueError(f"initialize: columns must be {', '.join(self.names)}, got {', '.join(columns)}")
+        given = np.broadcast_arrays(*(np.asarray(columns[name], np.float64) for name in self.names))
+        if given[0].ndim != 1 or not 1 <= given[0].size <= self._particles.capacity:
+            raise ValueError(
+                f"initialize: 1 to {self._particles.capacity} particles (the capacity) in one-dimensional columns "
+                f"are needed, got {given[0].shape}"
+            )
+        require_finite("initialize", *given)
+        linear = len(self.names) - self._sampled
+        spread = np.array(covariance, np.float64).reshape(np.shape(covariance) if linear else (0, 0))
+        self.covariance = checked_gaussian("initialize", np.zeros(linear), spread).covariance
+        self._particles.columns[:, : given[0].size] = given
+        self._recount(given[0].size)
+        self._level()
+
+    def predict(self, control: Control, duration: float) -> None:
+        """Move every particle, each with its own noise, and learn its linear states from where it went.
+
+        Parameters
+        ----------
+        control : Control
+            As the motion model wants it.
+        duration : float
+            Seconds, not negative.
+
+        Raises
+        ------
+        ValueError
+            A duration or control that is negative or not finite; nothing has moved then.
+        """
+        if not 0.0 <= duration < math.inf:
+            raise ValueError(f"predict: duration must be finite and not negative, got {duration} s")
+        step = self._motion.begin(control, duration)
+        self._check_step(step)
+        root, learning, gain = draw(self.covariance, step.coupling, step.noise)
+        drawn = joseph(self.covariance, gain, step.coupling, step.noise)
+        self.covariance = symmetric(step.transition @ drawn @ step.transition.T + step.linear_noise)
+        self._step += 1
+        pairs = (step.offset.size + 1) // 2
+        keys = [random.key(self._seed, pair) for pair in range(pairs)]
+        coupling, spread, learning = _float32(step.coupling), _float32(root), _float32(learning)
+        stays = np.array_equal(step.transition, np.eye(len(step.transition))) and not step.drift.any()
+        noise = np.zeros((2 * pairs, self._block), np.float32)
+        increments = np.zeros((step.offset.size, self._block), np.float32)
+        for first, last in self._bounds:
+            for pair, key in enumerate(keys):
+                random.normal_pairs(first, last, self._step & 0xFFFFFFFF, key, noise, 2 * pair)
+            increments[:] = step.offset[:, None]
+            means = self._particles.columns[self._sampled :]
+            kernels.add_product(coupling, means, first, increments, 0, last - first)
+            kernels.add_product(spread, noise, 0, increments, 0, last - first)
+            kernels.add_product(learning, noise, 0, means, first, last - first)
+            self._motion.move(self._particles, first, last, increments)
+            if not stays:
+                moved = np.repeat(step.drift.astype(np.float32)[:, None], last - first, axis=1)
+                kernels.add_product(_float32(step.transition), means, first, moved, 0, last - first)
+                means[:, first:last] = moved
+
+    def correct(self, sensor: MixedSensor[M], measurement: M) -> Evidence:
+        """Weigh in a measurement z = h(x) + C l + e; components that are NaN were not measured.
+
+        Returns
+        -------
+        Evidence
+            ``log_mean`` is the log density that the belief gave to what was measured; ``innovation`` the length of the
+            weighted mean innovation.
+
+        Raises
+        ------
+        ValueError
+            A measurement that is infinite, or shapes that do not fit; the belief is unchanged then.
+        numpy.linalg.LinAlgError
+            The innovation's covariance is not positive; the belief is unchanged then.
+        """
+        observation = sensor.begin(measurement)
+        measured, coupling, noise, angles = self._check_observation(observation)
+        seen = np.flatnonzero(~np.isnan(measured))
+        c, spread = coupling[seen], noise[np.ix_(seen, seen)]
+        covariance = symmetric(c @ self.covariance @ c.T + spread)
+        root = np.linalg.cholesky(covariance)
+        # what was not measured has a column of zeros: whatever is expected there, it counts for nothing
+        whitener = np.zeros((seen.size, measured.size))
+        whitener[:, seen] = np.linalg.inv(root)
+        gain = np.zeros((len(self.covariance), measured.size))
+        gain[:, seen] = np.linalg.solve(covariance, c @ self.covariance).T
+        innovation = self._correct_columns(
+            lambda first, last, expected: sensor.expect(self._particles, first, last, measurement, expected),
+            np.nan_to_num(measured),
+            (coupling, whitener, gain),
+            angles,
+        )
+        self.covariance = joseph(self.covariance, gain[:, seen], c, spread)
+        constant = -0.5 * seen.size * LOG_TWO_PI - float(np.log(np.diagonal(root)).sum())
+        return Evidence(self._normalize(constant), float(np.linalg.norm(innovation[seen])), accepted=True)
+
+    def weigh(self, sensor: Sensor[Any], measurement: tuple[float | None, ...]) -> Evidence:
+        """Weigh by a sensor model of :mod:`filters.sensing`, outliers and all.
+
+        It must see nonlinear states only: a linear one it would take as known, at each particle's mean.
+
+        Raises
+        ------
+        ValueError
+            The measurement is not finite; the weights are untouched then.
+        """
+        for value in measurement:
+            if value is not None and not math.isfinite(value):
+                raise ValueError(f"{type(sensor).__name__}: a measurement must be finite, got {measurement}")
+        if sensor.refusal(measurement) is not None:
+            return Evidence(math.nan, math.nan, accepted=False)
+        centre = dict(zip(self.names, self.moments().mean.tolist(), strict=True))
+        innovation = sensor.innovation(centre, measurement)
+        constant = 0.0
+        for first, last in self._bounds:
+            constant = sensor.weigh(self._particles, first, last, measurement)
+        return Evidence(self._normalize(constant), innovation, accepted=True)
+
+    def moments(self) -> MixedMoments:
+        """Say mean and covariance of the whole state."""
+        values = self._particles.columns[:, : self.count].astype(np.float64)
+        share = self.weights.astype(np.float64)
+        share /= share.sum()
+        mean = values @ share
+        for k in self._motion.angles:
+            mean[k] = math.atan2(np.sin(values[k]) @ share, np.cos(values[k]) @ share)
+        offsets = values - mean[:, None]
+        for k in self._motion.angles:
+            offsets[k] = np.remainder(offsets[k] + math.pi, 2.0 * math.pi) - math.pi
+        away = (
+            offsets @ share
+        )  # an angle's circular mean is not the mean of its offsets; for the rest it is rounding
+        covariance = (offsets * share) @ offsets.T - np.outer(away, away)
+        covariance[self._sampled :, self._sampled :] += self.covariance
+        return MixedMoments(self.names, mean, symmetric(covariance), self.effective_sample_size)
+
+    def resample(self, count: int | None = None) -> None:
+        """Draw ``count`` particles by Table 4.4, equally weighted; as many as now by default.
+
+        Raises
+        ------
+        ValueError
+            A count below 1 or above the capacity.
+        """
+        target = self.count if count is None else count
+        if not 1 <= target <= self._particles.capacity:
+            raise ValueError(
+                f"resample: count must lie in 1 to {self._particles.capacity} (the capacity), got {target}"
+            )
+        self._draws += 1
+        uniform = random.uniform(self._seed, _RESAMPLING_STREAM, self._draws)
+        ancestors = resampling.systematic(self.weights, target, uniform)
+        columns = self._particles.columns
+        deal(columns, self._spare, ancestors, self._places[:target])
+        self._particles.columns, self._spare = self._spare, columns
+        self._recount(target)
+        self._level()
+
+    def _correct_columns(
+        self,
+        expect: Callable[[int, int, Float32Array], None],
+        measured: Matrix,
+        matrices: tuple[Matrix, Matrix, Matrix],
+        angles: Sequence[int],
+    ) -> Matrix:
+        """Weigh and correct every particle by C, the whitener and the gain; return the weighted mean innovation."""
+        coupling, whitener, gain = (_float32(matrix) for matrix in matrices)
+        circular = np.zeros(measured.size, np.bool_)
+        circular[list(angles)] = True
+        z = measured.astype(np.float32)
+        residual = np.zeros((measured.size, self._block), np.float32)
+        white = np.zeros((len(whitener), self._block), np.float32)
+        total = np.zeros(measured.size)
+        means = self._particles.columns[self._sampled :]
+        for first, last in self._bounds:
+            width = last - first
+            expect(first, last, residual)
+            kernels.add_product(coupling, means, first, residual, 0, width)
+            kernels.subtract_from(residual, z, circular, width)
+            white[:] = 0.0
+            kernels.add_product(whitener, residual, 0, white, 0, width)
+            kernels.weigh(white, self._particles.log_weights, first, last)
+            kernels.add_product(gain, residual, 0, means, first, width)
+            total += residual[:, :width].astype(np.float64) @ self._weights[first:last]
+        mean = total / self._sums[0]
+        wrap(mean, angles)
+        return mean
+
+    def _normalize(self, constant: float) -> float:
+        """Make weights of the log weights; return the log of the mean likelihood, with its constant."""
+        before = self._sums[0]
+        logs = self._particles.log_weights
+        top = float(weights.peak(logs, 0, self.count))
+        if not weights.NOTHING < top < math.inf:
+            self.collapses += 1
+            self._level()
+            return -math.inf
+        self._sums = np.zeros(2)
+        for first, last in self._bounds:
+            weights.exponentiate(logs, self._weights, first, last, top, self._sums)
+        return constant + top + math.log(self._sums[0] / before)
+
+    def _level(self) -> None:
+        """Make all weights equal."""
+        self._particles.log_weights[: self.count] = 0.0
+        self._weights[: self.count] = 1.0
+        self._sums = np.full(2, float(self.count))
+
+    def _recount(self, count: int) -> None:
+        self._particles.count = count
+        self._bounds = list(pairwise([*range(0, count, self._block), count]))
+
+    def _check_step(self, step: MixedStep) -> None:
+        increments, linear = step.offset.size, len(self.covariance)
+        shapes = {
+            "offset": (increments,),
+            "coupling": (increments, linear),
+            "noise": (increments, increments),
+            "transition": (linear, linear),
+            "drift": (linear,),
+            "linear_noise": (linear, linear),
+        }
+        for matrix, (name, shape) in zip(step, shapes.items(), strict=True):
+            require_shape(f"marginal prediction: {name}", matrix, shape)
+        require_finite("marginal prediction", *step)
+
+    def _check_observation(self, observation: MixedObservation) -> MixedObservation:
+        measured, coupling, noise, _ = observation
+        require_shape("marginal correction: coupling", coupling, (measured.size, len(self.covariance)))
+        require_shape("marginal correction: noise", noise, (measured.size, measured.size))
+        require_finite("marginal correction", measured[~np.isnan(measured)], coupling, noise)
+        return observation
+
+
+def draw(covariance: Matrix, coupling: Matrix, noise: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+    """Prepare the draw of an increment v = A l + w and what is learned of l by it.
+
+    Parameters
+    ----------
+    covariance : (l, l) float64
+        P.
+    coupling : (k, l) float64
+        A.
+    noise : (k, k) float64
+        Q; some directions may be certain.
+
+    Returns
+    -------
+    (k, k), (l, k), (l, k) float64
+        L with L Lᵀ = A P Aᵀ + Q, lower triangular; J = P Aᵀ L⁻ᵀ, so that l += J n as v += L n; and the Kalman
+        gain J L⁻¹. A direction that is certain has a column of zeros in L and J.
+    """
+    total = symmetric(coupling @ covariance @ coupling.T + noise)
+    cross = covariance @ coupling.T
+    root = np.zeros_like(total)
+    learning = np.zeros_like(cross)
+    for j in range(len(total)):
+        pivot = total[j, j] - root[j, :j] @ root[j, :j]
+        if pivot > _SINGULAR * total[j, j]:
+            root[j, j] = math.sqrt(pivot)
+            root[j + 1 :, j] = (total[j + 1 :, j] - root[j + 1 :, :j] @ root[j, :j]) / root[j, j]
+            learning[:, j] = (cross[:, j] - learning[:, :j] @ root[j, :j]) / root[j, j]
+    return root, learning, learning @ np.linalg.pinv(root)
+
+
+def _float32(matrix: Matrix) -> Float32Array:
+    return np.ascontiguousarray(matrix, np.float32)
