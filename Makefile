@@ -18,7 +18,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 	touch $@
 
 install: $(INSTALLED) ## set up .venv and compile the kernels
-	$(BIN)/beliefd warm
+	$(BIN)/beliefd warm --all
 
 demo: install ## the main job, live in the terminal for a minute
 	$(BIN)/beliefd demo

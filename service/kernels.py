@@ -14,13 +14,16 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
 _KEPT = 3
 """How many digests a cache keeps: the newest, and those of two other versions that may still be in use."""
+
+_DAEMON = ("service.estimator",)
+"""What the loop imports; its kernels come with it."""
 
 _KERNEL = re.compile(rb"(?m)^@(kernel|function)\b")
 _IMPORT = re.compile(r"(?m)^from (filters(?:\.\w+)*) import (\([^)]*\)|.*)")
@@ -153,11 +156,26 @@ def _prune(folder: Path) -> None:
 
 
 def warm(progress: Progress) -> Path:
-    """Compile every kernel that is not in the cache yet; return the cache's folder."""
+    """Compile the kernels of the daemon that are not in the cache yet; return the cache's folder."""
+    return _warm(lambda: _DAEMON, progress)
+
+
+def warm_all(progress: Progress) -> Path:
+    """Compile every kernel of ``filters``, also of the ones that the daemon does not run."""
+    return _warm(_every_module, progress)
+
+
+def _every_module() -> Sequence[str]:
+    from filters.kernels import every_module
+
+    return every_module()
+
+
+def _warm(modules: Callable[[], Sequence[str]], progress: Progress) -> Path:
     folder = prepare()
     from filters.kernels import compile_all
 
-    compile_all(progress)
+    compile_all(modules(), progress)
     os.utime(folder)
     _prune(folder)
     return folder

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol, TypeVar, cast
 
@@ -120,11 +120,19 @@ def _deferred() -> Generator[None]:
         _deferring = before
 
 
-def compile_all(progress: Progress | None = None) -> int:
-    """Compile every kernel of ``filters``, or load it from the cache; what an installation step calls.
+def every_module() -> list[str]:
+    """Return the names of all modules of ``filters``."""
+    package = importlib.import_module("filters")
+    return [module.name for module in pkgutil.walk_packages(package.__path__, "filters.")]
+
+
+def compile_all(modules: Sequence[str], progress: Progress | None = None) -> int:
+    """Import modules and compile every kernel they come with, or load it from the cache.
 
     Parameters
     ----------
+    modules : sequence of str
+        Such as :func:`every_module` says, or those that a program needs.
     progress : callable, optional
         Told ``(name, index, total)`` before each kernel, with ``index`` from 0, and once more with
         ``index == total`` and an empty name when all are there.
@@ -134,12 +142,11 @@ def compile_all(progress: Progress | None = None) -> int:
     int
         How many kernels there are.
     """
-    package = importlib.import_module("filters")
     with _deferred():
-        for module in pkgutil.walk_packages(package.__path__, "filters."):
-            importlib.import_module(module.name)
+        for module in modules:
+            importlib.import_module(module)
     total = len(_kernels)
-    for index, pending in enumerate(_kernels.values()):
+    for index, pending in enumerate(list(_kernels.values())):
         if progress is not None:
             progress(pending.name, index, total)
         pending.compile()

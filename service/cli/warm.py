@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
 NAME = "warm"
 EPILOG = (
     "make install and beliefd service install call it; the compiled kernels are kept in the user's cache."
 )
 
 
-def command() -> None:
-    """Compile the kernels that are not in the cache yet."""
+Everything = Annotated[bool, typer.Option("--all", help="Also the kernels that the daemon does not run.")]
+
+
+def command(everything: Everything = False) -> None:
+    """Compile the daemon's kernels that are not in the cache yet."""
     import time
 
     from rich.console import Console
@@ -17,6 +24,7 @@ def command() -> None:
 
     from service import kernels
 
+    warm = kernels.warm_all if everything else kernels.warm
     started = time.monotonic()
     columns = (
         TextColumn("compiling"),
@@ -28,7 +36,7 @@ def command() -> None:
     console = Console()
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=None)
-        folder = kernels.warm(
+        folder = warm(
             lambda name, done, total: bar.update(task, description=name, completed=done, total=total)
         )
     console.print(

@@ -121,3 +121,11 @@ def test_a_cache_of_an_older_version_goes_in_the_end(tmp_path: Path) -> None:
         "kernels-now",
         "other",
     ]
+
+
+def test_the_daemon_is_warmed_with_its_own_kernels_only() -> None:
+    told = "told = []; kernels.warm(lambda name, done, total: told.append(name)); print(*told)"
+    done = prepared(f"from service import kernels; {told}", HOME=os.environ["HOME"])
+    names = done.stdout.split()
+    assert "filters.sensing.range.robust" in names, done.stderr
+    assert not [name for name in names if "raycast" in name or "marginal" in name], names
