@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from drivers.can import CanFrame, CanSettings, FrameDecoder, decoder_of
+from drivers.logs.receive_clock import MICROSECOND, on_clock
 from drivers.sample import LinkReport, Sample
 
 LONGEST_LINE = 1024
@@ -103,7 +104,6 @@ class CanLogReader:
         self._census = decoder_of(self._link, self._settings).census()
         self._tally = Tally()
         self._samples = 0
-        self._latest_ns = 0
 
     @property
     def size(self) -> int:
@@ -140,7 +140,7 @@ class CanLogReader:
         self._begin()
         with self._path.open("rb") as file:
             self._file = file
-            for time_ns, channel, frame in self._source(file, self._tally):
+            for time_ns, (channel, frame) in on_clock(self._stamped(file), self._tally.refused):
                 decoder = self._decoders.get(channel)
                 if decoder is None:
                     if len(self._decoders) == _MOST_CHANNELS:
@@ -148,8 +148,10 @@ class CanLogReader:
                         continue
                     decoder = self._decoders[channel] = decoder_of(self._link, self._settings)
                 self._census.count(frame)
-                # The stamps of several buses may cross by microseconds; the receive clock never goes back.
-                self._latest_ns = max(self._latest_ns, time_ns)
-                for sample in decoder.decode(frame, self._latest_ns):
+                for sample in decoder.decode(frame, time_ns):
                     self._samples += 1
                     yield sample
+
+    def _stamped(self, file: BinaryIO) -> Iterator[tuple[int, tuple[str, CanFrame]]]:
+        for time_ns, channel, frame in self._source(file, self._tally):
+            yield time_ns // MICROSECOND, (channel, frame)

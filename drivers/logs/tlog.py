@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from drivers.logs.receive_clock import LARGEST_STAMP, ReceiveClock
 from drivers.mavlink.decode import Decoder
 from drivers.mavlink.dialect import LAYOUTS
 from drivers.mavlink.frames import MARKERS, Fault, Frame, frame_at
@@ -20,50 +21,6 @@ from drivers.mavlink.settings import MavlinkSettings
 from drivers.sample import LinkReport, Sample
 
 STAMP = 8
-MICROSECOND = 1_000  # ns
-LONGEST_GAP = 60_000_000  # µs: further on, the next stamp decides whether this one is damaged
-LARGEST_STAMP = 2**63 // 1_000 - 1  # µs: beyond it nanoseconds fit no 64 bits; the year 2262
-OUT_OF_ORDER = 1_000_000  # µs: so little back is two writers of one log, not a clock that was set
-
-
-class ReceiveClock:
-    """The log's receive clock, kept from running back.
-
-    A stamp out of line whose successor is in line again is damaged: the last one is used, as for one that is
-    only a little behind. A longer step back that lasts (the clock was set) is taken out: time goes on from
-    there.
-
-    Parameters
-    ----------
-    stamps : list[int]
-        The first stamps of the log, microseconds, at best three: if one is damaged, the others overrule it.
-    """
-
-    def __init__(self, stamps: list[int]) -> None:
-        self.faults: Counter[str] = Counter()
-        self._shift = 0
-        middle = sorted(stamps)[len(stamps) // 2]
-        self._last = min(stamp for stamp in stamps if abs(stamp - middle) <= LONGEST_GAP)
-
-    def read(self, stamp: int, following: int | None) -> int:
-        """Return the time of arrival in nanoseconds; ``following`` is the log's next stamp, if any."""
-        time = stamp + self._shift
-        if not 0 <= time - self._last <= LONGEST_GAP:
-            time = self._judge(time, following)
-        self._last = time
-        return time * MICROSECOND
-
-    def _judge(self, time: int, following: int | None) -> int:
-        last = self._last
-        if following is not None and 0 <= following + self._shift - last <= LONGEST_GAP:
-            self.faults["bad_stamp"] += 1
-            return last
-        if time > last:
-            return time
-        if last - time > OUT_OF_ORDER:
-            self.faults["clock_step"] += 1
-            self._shift += last - time
-        return last
 
 
 class TlogReader:

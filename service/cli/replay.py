@@ -23,7 +23,10 @@ def command(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="Recordings: .tlog, candump .log(.gz).", metavar="LOG…", exists=True, dir_okay=False
+            help="Recordings: .tlog, .bin, .ulg, candump .log(.gz), .asc, .blf, .trc.",
+            metavar="LOG…",
+            exists=True,
+            dir_okay=False,
         ),
     ],
     config: Annotated[

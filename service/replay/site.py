@@ -45,7 +45,15 @@ class Setting:
 
 def beside(log: Path, ending: str) -> Path | None:
     """Return the file of the log's own name with another ending, if there is one."""
-    for suffix in (".candump.log.gz", ".candump.gz", ".candump.log", ".log.gz", log.suffix):
+    for suffix in (
+        ".candump.log.gz",
+        ".candump.gz",
+        ".candump.log",
+        ".log.gz",
+        ".asc.gz",
+        ".trc.gz",
+        log.suffix,
+    ):
         if log.name.endswith(suffix):
             candidate = log.with_name(log.name.removesuffix(suffix) + ending)
             return candidate if candidate.is_file() else None

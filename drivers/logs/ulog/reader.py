@@ -1,0 +1,305 @@
+"""ULog files as PX4 writes them: a header, definitions, then messages of a size, a letter and a content.
+
+There is no checksum. A message is believed when its letter is known and another one, or the end, follows at its
+size; one with data must also be of a topic that the log has subscribed to, and as long as that is. What lies between,
+after damage, is searched for the next such pair. Times are microseconds since boot; where a receiver knew the time,
+the log's clock is UTC (as Unix time), else it is the time since boot.
+"""
+
+from __future__ import annotations
+
+import mmap
+import re
+import struct
+from collections import Counter
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+from statistics import median_low
+
+from drivers.logs.receive_clock import LARGEST_STAMP, on_clock
+from drivers.logs.ulog.layout import Formats, Topic
+from drivers.logs.ulog.records import BLENDED, FIX_3D, RAW, Fields, Handler, Notes, handlers
+from drivers.plausibility import implausible
+from drivers.sample import LinkReport, Sample
+
+MAGIC = b"ULog\x01\x12\x35"
+HEADER_LENGTH = 16
+MESSAGE_HEADER = struct.Struct("<HB")
+SYNC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
+LETTERS = frozenset(b"BFIMPQARDLCSO")
+CANDIDATES = re.compile(rb"..[BFIMPQARDLCSO]", re.DOTALL)
+CHAIN = 8
+FLAGS = struct.Struct("<8s8s3Q")
+APPENDED = 1
+
+ENOUGH_FIXES = 5
+EARLIEST_UTC = (
+    946_684_800_000_000  # µs: 2000; an earlier one comes from a receiver that does not know the date
+)
+
+
+class Log:
+    """The data messages of a log, in order, with what was damaged or lost.
+
+    Attributes
+    ----------
+    topics : dict[int, Topic]
+        Subscriptions so far, by message id.
+    faults : Counter[str]
+        ``bad_magic``; ``bad_header``: stretches where no message was to be made out; ``lost_bytes`` in them;
+        ``bad_format``; ``dropout`` and ``dropout_ms``: what PX4 itself could not write in time; ``unknown_flags``: the
+        log says that it needs a newer reader.
+    kinds : Counter[str]
+        Data messages by topic.
+    position : int
+        Bytes read.
+    """
+
+    def __init__(self, data: mmap.mmap) -> None:
+        self._data = data
+        self._formats = Formats()
+        self._appended: list[int] = []
+        self.topics: dict[int, Topic] = {}
+        self.faults: Counter[str] = Counter()
+        self.kinds: Counter[str] = Counter()
+        self.position = 0
+
+    def __iter__(self) -> Iterator[tuple[Topic, bytes]]:
+        """Yield the topic and the content of every data message."""
+        at = HEADER_LENGTH
+        if self._data[: len(MAGIC)] != MAGIC:
+            self.faults["bad_magic"] += 1
+            at = 0
+        while at < len(self._data):
+            end = self._end_of(at)
+            if end is None:
+                at = self.position = self._resynchronise(at)
+                continue
+            letter, body = self._data[at + 2], self._data[at + 3 : end]
+            if letter == ord("D"):
+                topic = self.topics[int.from_bytes(body[:2], "little")]
+                self.kinds[topic.name] += 1
+                yield topic, body[2:]
+            else:
+                self._learn(letter, body)
+            at = self.position = end
+
+    def _end_of(self, at: int) -> int | None:
+        """Return where the message at ``at`` ends, if one is there and something follows it."""
+        end = self._end(at)
+        if end is None:
+            return None
+        return end if end in (len(self._data), *self._appended) or self._end(end) is not None else None
+
+    def _end(self, at: int) -> int | None:
+        data = self._data
+        if at + 3 > len(data):
+            return None
+        size, letter = MESSAGE_HEADER.unpack(data[at : at + 3])
+        end = at + 3 + size
+        if letter not in LETTERS or end > len(data) or any(at < place < end for place in self._appended):
+            return None
+        if letter == ord("S"):
+            return end if data[at + 3 : end] == SYNC else None
+        if letter != ord("D"):
+            return end
+        topic = self.topics.get(int.from_bytes(data[at + 3 : at + 5], "little"))
+        if topic is None or size < 2:
+            return None
+        shortest, longest = topic.sizes
+        return end if shortest <= size - 2 <= longest else None
+
+    def _resynchronise(self, at: int) -> int:
+        """Return where the next good message starts.
+
+        One that was cut off where data were appended (by a fault handler, after a crash) is no damage in the rest.
+        """
+        self.faults["bad_header"] += 1
+        search = at + 1
+        while candidate := CANDIDATES.search(self._data, search):
+            if self._convincing(candidate.start()):
+                break
+            search = candidate.start() + 1
+        found = candidate.start() if candidate else len(self._data)
+        self.faults["lost_bytes"] += found - at
+        return found
+
+    def _convincing(self, at: int) -> bool:
+        """Whether bytes found after damage are messages again.
+
+        Those with data and the synchronisation bytes are told from noise by what they hold, the others only by
+        a chain of them: of 256 letters 13 are known, and any size is possible.
+        """
+        for _ in range(CHAIN):
+            end = self._end(at)
+            if end is None:
+                return False
+            if end == len(self._data):
+                return True
+            if self._data[at + 2] in b"DS":
+                return self._end(end) is not None
+            at = end
+        return True
+
+    def _learn(self, letter: int, body: bytes) -> None:
+        """Take in what the log says of itself."""
+        if letter == ord("F"):
+            self.faults["bad_format"] += not self._formats.define(body.decode("ascii", errors="replace"))
+        elif letter == ord("A") and len(body) > 3:
+            self._subscribe(body)
+        elif letter == ord("R") and len(body) >= 2:
+            self.topics.pop(int.from_bytes(body[:2], "little"), None)
+        elif letter == ord("O") and len(body) >= 2:
+            self.faults["dropout"] += 1
+            self.faults["dropout_ms"] += int.from_bytes(body[:2], "little")
+        elif letter == ord("B") and len(body) >= FLAGS.size:
+            self._flags(body)
+
+    def _subscribe(self, body: bytes) -> None:
+        topic = self._formats.topic(body[3:].decode("ascii", errors="replace"), body[0])
+        if topic is None:
+            self.faults["bad_format"] += 1
+        else:
+            self.topics[int.from_bytes(body[1:3], "little")] = topic
+
+    def _flags(self, body: bytes) -> None:
+        _, incompatible, *offsets = FLAGS.unpack_from(body)
+        if incompatible[0] & APPENDED:
+            self._appended = [offset for offset in offsets if offset > 0]
+        if incompatible[0] & ~APPENDED or any(incompatible[1:]):
+            self.faults["unknown_flags"] += 1
+
+
+class UlogReader:
+    """Reads a .ulg; see :class:`drivers.logs.LogReader`.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    link_name : str
+        What the samples name as their link.
+    """
+
+    def __init__(self, path: Path, link_name: str) -> None:
+        self._path = path
+        self._link = link_name
+        self._begin()
+
+    def _begin(self) -> None:
+        self._log: Log | None = None
+        self._notes = Notes()
+        self._handlers: dict[tuple[str, int], Handler | None] = {}
+        self._faults: Counter[str] = Counter()
+        self._messages = 0
+        self._samples = 0
+        self._ignored = 0
+        self._blended = False
+        self._on_utc = False
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file."""
+        return self._path.stat().st_size
+
+    @property
+    def position(self) -> int:
+        """Bytes read so far."""
+        return self._log.position if self._log else 0
+
+    def __iter__(self) -> Iterator[Sample]:
+        """Read from the start, in the order of the log.
+
+        Raises
+        ------
+        OSError
+            The file cannot be read.
+        """
+        self._begin()
+        if self.size == 0:  # an empty file cannot be mapped
+            return
+        with self._path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            base, self._blended = unix_at_boot(data)
+            self._on_utc = base is not None
+            self._log = Log(data)
+            for time, (topic, fields) in on_clock(self._wanted(self._log), self._faults):
+                yield from self._samples_of(topic, fields, time, base or 0)
+
+    def _wanted(self, log: Log) -> Iterator[tuple[int, tuple[Topic, Fields]]]:
+        """Yield the messages that have a handler, with their stamps."""
+        for topic, body in log:
+            if self._handler(topic) is None:
+                self._ignored += 1
+                continue
+            fields = topic.fields(body)
+            yield min(int(fields["timestamp"]), LARGEST_STAMP // 2), (topic, fields)
+
+    def _handler(self, topic: Topic) -> Handler | None:
+        """Return the handler of a topic and instance; of most topics only the first instance has one."""
+        key = (topic.name, topic.instance)
+        if key not in self._handlers:
+            several = topic.name in ("distance_sensor", "ranging_beacon")
+            repeated = topic.name == RAW and self._blended
+            wanted = (topic.instance == 0 or several) and not repeated and "timestamp" in topic.columns
+            self._handlers[key] = handlers().get(topic.name) if wanted else None
+        return self._handlers[key]
+
+    def _samples_of(self, topic: Topic, fields: Fields, received: int, base: int) -> Iterator[Sample]:
+        handler = self._handler(topic)
+        assert handler is not None
+        self._messages += 1
+        try:
+            readings = handler(fields, self._notes)
+        except (KeyError, ValueError, OverflowError) as error:  # a field is absent; a count is no number
+            missing = error.args[0] if isinstance(error, KeyError) else "value"
+            self._notes.malformed[f"{topic.name}.{missing}"] += 1
+            return
+        measured, stamp = int(fields.get("timestamp_sample", 0)), int(fields["timestamp"])
+        age = (stamp - measured) * 1_000 if 0 < measured <= stamp else 0
+        for reading in readings:
+            wrong = implausible(reading)
+            if wrong is not None:
+                self._notes.malformed[f"{topic.name}.{wrong}"] += 1
+                continue
+            self._samples += 1
+            yield Sample(max(0, received - age) + base, received + base, self._link, topic.name, reading)
+
+    def report(self) -> LinkReport:
+        """Return the totals of the iteration so far."""
+        damage = self._log.faults if self._log else Counter[str]()
+        return LinkReport(
+            self._link,
+            "up",
+            messages=self._messages,
+            samples=self._samples,
+            malformed=dict(damage + self._faults + self._notes.malformed),
+            unusable=dict(+self._notes.unusable),
+            ignored=self._ignored,
+            opened=1,
+            clock="utc" if self._on_utc else "boot",
+        )
+
+    def kinds(self) -> dict[str, int]:
+        """Return how many messages of each topic were met, wanted or not."""
+        return dict(self._log.kinds) if self._log else {}
+
+
+def unix_at_boot(data: mmap.mmap) -> tuple[int | None, bool]:
+    """Return Unix time less time since boot (ns) by the first fixes, and whether the blended position is logged.
+
+    The first is ``None`` where no receiver knew the time.
+    """
+    blended = list(islice(_bases(data, BLENDED), ENOUGH_FIXES))
+    raw = [] if blended else list(islice(_bases(data, RAW), ENOUGH_FIXES))
+    return (median_low(blended or raw) if blended or raw else None), bool(blended)
+
+
+def _bases(data: mmap.mmap, name: str) -> Iterator[int]:
+    for topic, body in Log(data):
+        if topic.name != name or topic.instance != 0:
+            continue
+        fields = topic.fields(body)
+        stamp, utc = int(fields.get("timestamp", 0)), int(fields.get("time_utc_usec", 0))
+        if fields.get("fix_type", 0) >= FIX_3D and EARLIEST_UTC <= utc <= LARGEST_STAMP and stamp <= utc:
+            yield (utc - stamp) * 1_000
