@@ -26,8 +26,8 @@ UNIFORM = 8.0
 
 def wrap(angle: Array) -> Array:
     """Return the same angle in [-pi, pi)."""
-    folded = np.remainder(angle + math.pi, TURN) - math.pi
-    return np.where(folded >= math.pi, -math.pi, folded)
+    folded = angle - TURN * np.floor((angle + math.pi) / TURN)
+    return np.where(np.abs(folded) >= math.pi, -math.pi, folded)
 
 
 def wrap_columns(points: Array, circular: Flags) -> Array:

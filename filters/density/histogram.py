@@ -89,7 +89,9 @@ def grid_about(particles: Weighted) -> Grid:
     """
     size = particles.points.shape[1]
     if size > MOST_AXES:
-        raise ValueError(f"histogram extraction: at most {MOST_AXES} dimensions, got {size}; take a density tree")
+        raise ValueError(
+            f"histogram extraction: at most {MOST_AXES} dimensions, got {size}; take a density tree"
+        )
     low, high = particles.points.min(axis=0), particles.points.max(axis=0)
     low, high = low - 1e-9 * (1.0 + np.abs(low)), high + 1e-9 * (1.0 + np.abs(high))
     length = np.where(particles.circular, 2.0 * math.pi, high - low)

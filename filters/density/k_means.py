@@ -233,9 +233,7 @@ class Clusters:
             factors, constants = _metric(fit, least)
             centres = fit.means.astype(np.float32)
             few = self._some_weights.size
-            refined = self._gather(
-                self._some, self._some_weights, few, centres, factors, constants, centres
-            )
+            refined = self._gather(self._some, self._some_weights, few, centres, factors, constants, centres)
             before, evidence = evidence, self._evidence(refined, effective, least)
             fit = refined
             if abs(evidence - before) < 0.5:
@@ -293,9 +291,7 @@ class Clusters:
             raise ValueError("clusters: particles must be finite, their weights with a positive finite sum")
         return self._about_its_means(columns, weights, count, fit, centres, factors, constants)
 
-    def _all(
-        self, columns: Float32Array, weights: Float32Array, count: int, found: Fit, least: Array
-    ) -> Fit:
+    def _all(self, columns: Float32Array, weights: Float32Array, count: int, found: Fit, least: Array) -> Fit:
         """Assign every particle to the clusters found, and gather them."""
         factors, constants = _metric(found, least)
         centres = found.means.astype(np.float32)
@@ -457,7 +453,9 @@ class KMeans:
         columns = np.ascontiguousarray((particles.points - origin).T, np.float32)
         share = (particles.weights / particles.weights.max()).astype(np.float32)
         found = clusters.extract(columns, share, len(share))
-        components = [type(each)(each.mean + origin, each.covariance, [*each.circular]) for each in found.components]
+        components = [
+            type(each)(each.mean + origin, each.covariance, [*each.circular]) for each in found.components
+        ]
         return Mixture(found.weights, components, found.left_out)
 
 

@@ -53,7 +53,9 @@ class Mixture:
             )
         self.circular = components[0].circular
         if any(not np.array_equal(each.circular, self.circular) for each in components):
-            raise ValueError("mixture: every component must have the same dimensions, the same of them circular")
+            raise ValueError(
+                "mixture: every component must have the same dimensions, the same of them circular"
+            )
         self.weights: Array = share / share.sum()
         self.components = tuple(components)
         self.left_out = left_out

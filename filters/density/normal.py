@@ -52,11 +52,15 @@ class Gaussian:
                 f"{spread.shape} and {flags.shape}"
             )
         if not (np.isfinite(centre).all() and np.isfinite(spread).all()):
-            raise ValueError(f"Gaussian: mean and covariance must be finite, got {centre} and {spread.tolist()}")
+            raise ValueError(
+                f"Gaussian: mean and covariance must be finite, got {centre} and {spread.tolist()}"
+            )
         try:
             root = np.linalg.cholesky(spread)
         except np.linalg.LinAlgError:
-            raise ValueError(f"Gaussian: covariance must be positive definite, got {spread.tolist()}") from None
+            raise ValueError(
+                f"Gaussian: covariance must be positive definite, got {spread.tolist()}"
+            ) from None
         self.mean: Array = angles.wrap_columns(centre, flags)
         self.covariance: Array = spread
         self.circular: Flags = flags

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy import float32, int32
+from numpy import float32, float64, int32
 from numpy.typing import NDArray
 
 from filters.kernels.compile import Float32Array, Int32Array, kernel
@@ -161,12 +161,12 @@ def second_moments(
     size = centres.shape[1]
     for i in range(first, last):
         k = labels[i - first]
-        weight = float(weights[i])
+        weight = float64(weights[i])
         row = sums[k]
         row[0] += weight
         place = 1 + 3 * size
         for j in range(size):
-            step = float(columns[j, i]) - float(centres[k, j])
+            step = float64(columns[j, i]) - float64(centres[k, j])
             if circular[j]:
                 if step > math.pi:
                     step -= TURN

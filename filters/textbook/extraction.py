@@ -61,7 +61,9 @@ def extraction(count: int = 500, points: int = 1201, seed: int = 4) -> Extractio
         Fewer than ten particles or two points.
     """
     if count < 10 or points < 2:
-        raise ValueError(f"extraction: at least 10 particles and 2 points are needed, got {count} and {points}")
+        raise ValueError(
+            f"extraction: at least 10 particles and 2 points are needed, got {count} and {points}"
+        )
     particles = transform.sample(count, np.random.default_rng(seed))[1]
     given = particles[:, None]
     one, mixture, histogram = gaussian(given), KMeans()(given), Histograms()(given)
