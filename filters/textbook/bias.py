@@ -14,7 +14,7 @@ carried out on the distribution itself instead of on draws, over any number of s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -25,8 +25,11 @@ from filters.resampling import multinomial
 
 Array = NDArray[np.float64]
 
-MOST = 200_000
-"""Largest number of joint states, states to the power of particles, that is enumerated."""
+MOST = 100_000
+"""Largest number of joint states, states to the power of particles, that is enumerated for one step."""
+
+MOST_FOR_MORE = 3_000
+"""The same where another step follows: each joint state then leads to all of them."""
 
 
 class Step(NamedTuple):
@@ -65,19 +68,23 @@ def expected(prior: ArrayLike, steps: Sequence[Step], particles: int) -> Array:
     """
     start = _checked(prior, steps)
     size = start.size
-    if particles < 1 or size**particles > MOST:
+    most = MOST if len(steps) <= 1 else MOST_FOR_MORE
+    if particles < 1 or size**particles > most:
         raise ValueError(
-            f"bias: {particles} particles of {size} states make {size}^{particles} joint states; 1 to {MOST} can be "
-            "enumerated"
+            f"bias: {particles} particles of {size} states make {size}^{particles} joint states; over {len(steps)} "
+            f"steps, 1 to {most} can be enumerated"
         )
     joint = np.array(1.0)
     for _ in range(particles):
         joint = np.multiply.outer(joint, start)
-    for step in steps:
-        for axis in range(particles):
-            joint = np.moveaxis(np.tensordot(joint, step.transition, axes=(axis, 0)), -1, axis)
-        joint = _resampled(joint, step.likelihood)
-    return joint.reshape(size, -1).sum(axis=1)
+    for step in steps[:-1]:
+        joint = _resampled(_moved(joint, step.transition), step.likelihood)
+    if not steps:
+        return start
+    mean = np.zeros(size)
+    for chance, share in _shares(_moved(joint, steps[-1].transition), steps[-1].likelihood):
+        mean += chance * share
+    return mean
 
 
 def simulated(prior: ArrayLike, steps: Sequence[Step], particles: int, runs: int, seed: int) -> Array:
@@ -105,20 +112,31 @@ def simulated(prior: ArrayLike, steps: Sequence[Step], particles: int, runs: int
     return np.bincount(states.ravel(), minlength=start.size) / states.size
 
 
-def _resampled(joint: Array, likelihood: Array) -> Array:
-    """Lines 8 to 11 on the joint distribution: given the moved particles, each new one is drawn independently."""
+def _moved(joint: Array, transition: Array) -> Array:
+    """Line 4 on the joint distribution: each particle moves by itself."""
+    for axis in range(joint.ndim):
+        joint = np.moveaxis(np.tensordot(joint, transition, axes=(axis, 0)), -1, axis)
+    return joint
+
+
+def _shares(joint: Array, likelihood: Array) -> Iterator[tuple[float, Array]]:
+    """Line 5: every joint state that can be, its probability, and the share of weight in each state."""
     particles, size = joint.ndim, joint.shape[0]
-    after = np.zeros_like(joint)
     for states in product(range(size), repeat=particles):
-        chance = joint[states]
-        if chance == 0.0:
-            continue
-        weights = likelihood[list(states)]
-        if weights.sum() == 0.0:
-            weights = np.ones(particles)
-        share = np.bincount(states, weights=weights, minlength=size) / weights.sum()
+        chance = float(joint[states])
+        if chance > 0.0:
+            weights = likelihood[list(states)]
+            if weights.sum() == 0.0:  # as ParticleFilter.normalize does
+                weights = np.ones(particles)
+            yield chance, np.bincount(states, weights=weights, minlength=size) / weights.sum()
+
+
+def _resampled(joint: Array, likelihood: Array) -> Array:
+    """Lines 8 to 11: given the moved particles, each new one is drawn independently."""
+    after = np.zeros_like(joint)
+    for chance, share in _shares(joint, likelihood):
         independent = np.array(chance)
-        for _ in range(particles):
+        for _ in range(joint.ndim):
             independent = np.multiply.outer(independent, share)
         after += independent
     return after
