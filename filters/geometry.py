@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Array = NDArray[np.float64]
+
 MOST_CELLS = 1 << 28
 """A map larger than this is a mistake in its resolution."""
 
@@ -54,19 +56,13 @@ class GridGeometry:
         """Rows and columns."""
         return self.rows, self.columns
 
-    def cells(self, north: ArrayLike, east: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def cells(self, north: ArrayLike, east: ArrayLike) -> tuple[Array, Array]:
         """Row and column of places, as real numbers: the whole part is the cell, if it lies in the grid."""
-        row: NDArray[np.float64] = np.array(north, np.float64)
-        column: NDArray[np.float64] = np.array(east, np.float64)
-        row -= self.north
-        column -= self.east
-        row /= self.resolution
-        column /= self.resolution
+        row = (np.asarray(north, np.float64) - self.north) / self.resolution
+        column = (np.asarray(east, np.float64) - self.east) / self.resolution
         return row, column
 
-    def centres(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def centres(self) -> tuple[Array, Array]:
         """North of each row's middle, (rows,), and east of each column's, (columns,), metres."""
-        return (
-            self.north + self.resolution * (np.arange(self.rows) + 0.5),
-            self.east + self.resolution * (np.arange(self.columns) + 0.5),
-        )
+        rows, columns = np.arange(self.rows, dtype=np.float64), np.arange(self.columns, dtype=np.float64)
+        return self.north + self.resolution * (rows + 0.5), self.east + self.resolution * (columns + 0.5)
