@@ -1,4 +1,4 @@
-"""The marginalised filter: the Kalman filter where all is linear, the unicycle's own marginalisation, the plain filter."""
+"""The marginalised filter: the Kalman filter where all is linear, the unicycle as it marginalises, the plain filter."""
 
 from __future__ import annotations
 
