@@ -42,7 +42,7 @@ def figure_4_5() -> Figure:
     shown = extraction(500)
     figure, axes = plt.subplots(2, 3, figsize=(8.6, 5.0), sharex=True, sharey=True, layout="constrained")
     titles = {
-        "particles": "particles and exact density",
+        "particles": "exact density",
         "gaussian": "Gaussian",
         "histogram": "histogram",
         "kernel": "kernel density",
@@ -54,12 +54,13 @@ def figure_4_5() -> Figure:
         axis.plot(
             shown.particles, np.full(shown.particles.size, -0.035), "|", color=BLUE, alpha=0.3, markersize=6
         )
+        kept = f"{shown.particles.size} particles"
         if name != "particles":
             axis.plot(shown.y, shown.densities[name], color=RED, linewidth=1.3)
-            title += f"\n{shown.numbers[name]} numbers, {100 * shown.error[name]:.0f} % misplaced"
+            kept = f"{shown.numbers[name]} numbers, {100 * shown.error[name]:.0f} % misplaced"
         if name == "gaussian":
             axis.plot(shown.y, shown.exact_gaussian, "--", color="black", linewidth=1)
-        axis.set_title(title, fontsize=9)
+        axis.set_title(f"{title}\n{kept}", fontsize=9)
     for axis in axes[1]:
         axis.set_xlabel("state y")
     for axis in axes[:, 0]:

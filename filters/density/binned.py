@@ -78,7 +78,8 @@ class BinnedKernelDensity:
         """Return the density at points; see :class:`filters.density.protocol.Density`."""
         given = angles.wrap_columns(asked("binned kernel density", points, self._low.size), self.circular)
         last = self._low + self._step * (np.array(self.shape) - 1)
-        inside = (self.circular | ((given >= self._low) & (given <= last))).all(axis=1)
+        within = np.asarray((given >= self._low) & (given <= last), np.bool_)
+        inside = (within | self.circular).all(axis=1)
         given = np.where(inside[:, None], given, self._low)
         total = np.zeros(len(given))
         for nodes, share in self._corners(given):
@@ -87,8 +88,8 @@ class BinnedKernelDensity:
 
     def draw(self, count: int, generator: np.random.Generator) -> Array:
         """Draw points: a node by its probability, then from the triangle about it."""
-        cumulative = self.masses.cumsum()
-        chosen = np.searchsorted(cumulative, generator.random(count) * cumulative[-1], side="right")
+        cumulative: Array = self.masses.cumsum()
+        chosen = np.searchsorted(cumulative, generator.random(count) * float(cumulative[-1]), side="right")
         places = np.column_stack(np.unravel_index(chosen, self.shape))
         within = generator.random((count, 2, self._low.size)).sum(axis=1) - 1.0
         return angles.wrap_columns(self._low + (places + within) * self._step, self.circular)
@@ -119,7 +120,7 @@ class BinnedKernelDensity:
         spectrum = np.fft.rfftn(masses)
         for j, (count, step, width) in enumerate(zip(self.shape, self._step, self.bandwidth, strict=True)):
             last = j == len(self.shape) - 1
-            turns = np.fft.rfftfreq(count, step) if last else np.fft.fftfreq(count, step)
+            turns: Array = np.fft.rfftfreq(count, step) if last else np.fft.fftfreq(count, step)
             response = np.exp(-0.5 * np.square(angles.TURN * turns) * (width * width - step * step / 3.0))
             spectrum *= response.reshape([-1 if k == j else 1 for k in range(len(self.shape))])
         return np.fft.irfftn(spectrum, self.shape, axes=range(len(self.shape)))

@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from filters.density import circular as angles
 from filters.density.mixture import Mixture
@@ -32,6 +32,8 @@ from filters.density.weighted import weighted
 from filters.kernels import clusters as kernels
 from filters.kernels import random
 from filters.kernels.compile import Float32Array
+
+Indices = NDArray[np.int64]
 
 BLOCK = 8192
 """Particles that are assigned at once."""
@@ -148,11 +150,9 @@ class Clusters:
         kernels.sample(columns, weights, count, self._some, self._some_weights)
         whole = self._whole(columns, weights, count)
         found = self._search(whole)
-        if len(found.weights) > 1:
-            found = self._all(columns, weights, count, found, self._least(whole))
-        else:
-            found = whole
-        return self._mixture(found)
+        if len(found.weights) == 1:
+            return self._mixture(whole)
+        return self._mixture(self._all(columns, weights, count, found, self._least(whole)))
 
     # --- the search, over the sample ----------------------------------------------------------------------------
 
@@ -202,10 +202,10 @@ class Clusters:
         none = np.zeros(k, np.float32)
         self._assign(self._some, 0, few, means.astype(np.float32), factors[:k], none)
         costs = self._costs[:few]
-        gathered = np.cumsum(self._some_weights * costs, dtype=np.float64)
+        gathered: Array = np.cumsum(self._some_weights * costs, dtype=np.float64)
         least, chosen = math.inf, 0
         for trial in range(TRIALS):
-            place = random.uniform(self._seed, k, trial) * gathered[-1]
+            place = random.uniform(self._seed, k, trial) * float(gathered[-1])
             candidate = min(int(np.searchsorted(gathered, place)), few - 1)
             kernels.assign(
                 self._some,
@@ -264,9 +264,9 @@ class Clusters:
             fit = Fit(*(np.concatenate([a[kept], b[top : top + 1]]) for a, b in zip(fit, pairs, strict=True)))
         return fit
 
-    def _merged(self, fit: Fit, one: Array, other: Array) -> Fit:
+    def _merged(self, fit: Fit, one: Indices, other: Indices) -> Fit:
         """Return the clusters that pairs of clusters would be."""
-        a, b = (Fit(*(field[index] for field in fit)) for index in (one.astype(int), other.astype(int)))
+        a, b = (Fit(*(field[index] for field in fit)) for index in (one, other))
         total = a.weights + b.weights
         share = b.weights / total
         apart = angles.difference(b.means, a.means, self.circular)

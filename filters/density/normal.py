@@ -64,8 +64,8 @@ class Gaussian:
         self.mean: Array = angles.wrap_columns(centre, flags)
         self.covariance: Array = spread
         self.circular: Flags = flags
-        self._root: Array = root
-        self._whitener: Array = np.linalg.inv(root)
+        self._root: Array = np.asarray(root, np.float64)
+        self._whitener: Array = np.asarray(np.linalg.inv(root), np.float64)
         self._height = math.exp(-0.5 * size * math.log(2.0 * math.pi)) / float(np.prod(np.diag(root)))
 
     def evaluate(self, points: ArrayLike) -> Array:

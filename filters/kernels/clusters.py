@@ -42,7 +42,7 @@ def sample(
     "void(float32[:, ::1], int64, int64, float32[:, ::1], float32[:, :, ::1], float32[::1], boolean[::1],"
     "float32[:, ::1], float32[::1], int32[::1])"
 )
-def assign(
+def assign(  # noqa: C901  the loops of one pass, each a line or two
     columns: Float32Array,
     first: int,
     last: int,

@@ -76,7 +76,7 @@ def extraction(count: int = 500, points: int = 1201, seed: int = 4) -> Extractio
         "kernel": kernel,
     }
     mean, variance = transform.moments()
-    y = np.linspace(mean - 4.0 * variance**0.5, mean + 4.0 * variance**0.5, points)
+    y: Vector = mean + variance**0.5 * np.linspace(-4.0, 4.0, points, dtype=np.float64)
     exact = transform.density(y)
     curves = {name: density.evaluate(y[:, None]) for name, density in densities.items()}
     step = float(y[1] - y[0])

@@ -27,7 +27,7 @@ def test_wound_it_equals_the_sum_over_turns(sigma: float) -> None:
     density = Gaussian([0.5, 3.0], covariance, [False, True])
     points = np.random.default_rng(2).uniform(-3.0, 3.0, (100, 2))
     unwound = stats.multivariate_normal([0.5, 3.0], covariance)
-    expected = sum(unwound.pdf(points + [0.0, 2.0 * math.pi * k]) for k in range(-12, 13))
+    expected = sum(unwound.pdf(points + np.array([0.0, 2.0 * math.pi * k])) for k in range(-12, 13))
     np.testing.assert_allclose(density.evaluate(points), expected, rtol=1e-10, atol=1e-300)
 
 

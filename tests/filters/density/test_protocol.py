@@ -110,7 +110,7 @@ def test_draws_fall_where_it_is_dense(case: tuple[Density, Grid, bool]) -> None:
 def test_angles_may_be_asked_for_any_turn_away(case: tuple[Density, Grid, bool]) -> None:
     density, grid, smooth = case
     some = grid.points[::371]
-    turned = density.evaluate(some + [0.0, 2.0 * math.pi])
+    turned = density.evaluate(some + np.array([0.0, 2.0 * math.pi]))
     np.testing.assert_allclose(turned, density.evaluate(some), rtol=1e-6 if smooth else 1e-3, atol=1e-9)
 
 
