@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 OCCUPIED = 0.5
 """A cell more likely occupied than this stops the rays of expected ranges."""
 
+MOST_RAYS = 4096
+"""Of a sector. One so wide and so long that its rays part by more than a cell has its end far from any map."""
+
 
 class InverseRangeModel:
     """p(occupied | z) of the cells of a sector.
@@ -241,7 +244,7 @@ class OccupancyGrid:
 
 def _fan(bearings: Array, widths: Array, reach: Array) -> tuple[Array, NDArray[np.intp]]:
     """Split each sector into rays not farther apart than a cell at its end; also the sector of each ray."""
-    counts = np.maximum(1, np.ceil(widths * reach)).astype(np.intp)
+    counts = np.clip(np.ceil(widths * reach), 1, MOST_RAYS).astype(np.intp)
     sector = np.repeat(np.arange(bearings.size), counts)
     place = np.arange(sector.size) - np.repeat(np.cumsum(counts) - counts, counts)
     return bearings[sector] + widths[sector] * ((place + 0.5) / counts[sector] - 0.5), sector

@@ -132,6 +132,11 @@ def test_a_wide_sector_sees_the_nearest_thing_in_it() -> None:
         assert wide == pytest.approx(grid.expected_ranges(pose, bearing + fine, 9.0).min(), abs=0.1)
 
 
+def test_a_sector_as_long_as_the_earth_is_round_is_cast_all_the_same() -> None:
+    ranges = room().expected_ranges([0.0, 2.0, 0.0], [0.0], 4e7, width=6.0)
+    np.testing.assert_allclose(ranges, [1.9], atol=1e-3)
+
+
 def test_a_known_map_as_a_belief() -> None:
     grid = OccupancyGrid.from_probability(0.1, 1.0, 2.0, [[0.0, NAN, 1.0, 0.6]], limit=4.0)
     np.testing.assert_allclose(grid.cells.log_odds, [[-4.0, 0.0, 4.0, log_odds(0.6)]])
