@@ -30,7 +30,7 @@ _FLEXIBLE = re.compile(
     rb"(?P<data>(?:\s+[0-9A-Fa-f]{1,3})*).*",
     re.I,
 )
-_OF_A_FRAME = re.compile(rb"(?:\d{1,3}\s+[0-9A-Fa-f]+x?\s+(?:Rx|Tx)|CANFD)\b", re.I)
+_OF_A_FRAME = re.compile(rb"(?:\d{1,3}\s+\S{1,128}\s+(?:Rx|Tx)|CANFD)\b", re.I)
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _GERMAN = {"mär": "mar", "mrz": "mar", "mai": "may", "okt": "oct", "dez": "dec"}
 _FORMATS = ("%m %d %I:%M:%S.%f %p %Y", "%m %d %I:%M:%S %p %Y", "%m %d %H:%M:%S.%f %Y", "%m %d %H:%M:%S %Y")

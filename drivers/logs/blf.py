@@ -93,16 +93,16 @@ def _containers(file: BinaryIO, tally: Tally) -> Iterator[bytes]:
                 return
             continue
         body = file.read(size - _OBJECT.size)
-        tally.refused["truncated_file"] += len(body) < size - _OBJECT.size
+        cut = len(body) < size - _OBJECT.size
+        tally.refused["truncated_file"] += cut
         yield from _content(kind, head, body, tally)
-        file.seek(size % 4, 1)
-        if file.read(4) not in (_MAGIC, b""):  # its size was wrong: the next may lie inside
+        file.seek(at + size + size % 4)
+        if cut or file.read(4) not in (_MAGIC, b""):  # its size may be wrong, and the next lie inside
             yield b""
-            file.seek(at + _OBJECT.size)
-            if not _resynchronise(file, at + _OBJECT.size - 1, tally):
+            if not _resynchronise(file, at, tally):
                 return
             continue
-        file.seek(min(at + size + size % 4, file.tell()))
+        file.seek(at + size + size % 4)
 
 
 def _content(kind: int, head: bytes, body: bytes, tally: Tally) -> Iterator[bytes]:

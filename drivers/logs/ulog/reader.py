@@ -30,6 +30,7 @@ SYNC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 LETTERS = frozenset(b"BFIMPQARDLCSO")
 CANDIDATES = re.compile(rb"..[BFIMPQARDLCSO]", re.DOTALL)
 CHAIN = 8
+LONGEST = MESSAGE_HEADER.size + 2**16
 FLAGS = struct.Struct("<8s8s3Q")
 APPENDED = 1
 
@@ -71,6 +72,7 @@ class Log:
         if self._data[: len(MAGIC)] != MAGIC:
             self.faults["bad_magic"] += 1
             at = 0
+        self.position = min(at, len(self._data))
         while at < len(self._data):
             end = self._end_of(at)
             if end is None:
@@ -90,7 +92,8 @@ class Log:
         end = self._end(at)
         if end is None:
             return None
-        return end if end in (len(self._data), *self._appended) or self._end(end) is not None else None
+        cut_off = any(end <= place <= end + LONGEST for place in self._appended)
+        return end if end == len(self._data) or cut_off or self._end(end) is not None else None
 
     def _end(self, at: int) -> int | None:
         data = self._data
