@@ -54,7 +54,7 @@ def test_simulation_agrees_with_enumeration(particles: int) -> None:
 
 
 def test_the_bias_falls_as_one_over_the_particles() -> None:
-    """Times M it tends to the second-order expansion of a ratio of means, and what is left of it halves as M doubles."""
+    """Times M it tends to the second-order expansion of a ratio of means; what is left halves as M doubles."""
     p, w = np.array([0.4, 0.6]), np.array([0.9, 0.3])
     step = [Step(STAY, w)]
     limit = (p * w / (p @ w) * (p @ w**2) - p * w**2) / (p @ w) ** 2

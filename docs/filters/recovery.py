@@ -1,0 +1,167 @@
+"""The figures of recovery.md, drawn from the project's own code: python docs/filters/recovery.py [FOLDER]."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from filters.motion import RandomWalk, Unicycle, UnicycleControl
+from filters.particle import ParticleFilter
+from filters.proposals import Ring, Rings
+from filters.recovery import AugmentedRecovery
+from filters.regularization import Preserving, Spreading
+from filters.sensing import Range, RangeMeasurement
+
+BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
+STYLE = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e6e6",
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "svg.hashsalt": "beliefd",
+    "savefig.bbox": "tight",
+}
+
+BEACONS = ((-40.0, -40.0), (45.0, -35.0), (0.0, 50.0))
+COUNT, TICK, TAKEN, STEPS = 2000, 0.1, 100, 200
+
+
+class Run(NamedTuple):
+    """Error (m) and share at each step."""
+
+    errors: list[float]
+    shares: list[float]
+
+
+def kidnapped_run(evidence_from: str) -> Run:
+    """Three ranges a step; at step 100 the vehicle is carried off by 50 m."""
+    rng, sensor = np.random.default_rng(1), Range(0.5, outliers=0.05, span=200.0)
+    belief = ParticleFilter(Unicycle(0.3, 0.1, 0.0, 0.0), capacity=COUNT, seed=1)
+    start = {name: rng.normal(0.0, 0.3, COUNT) for name in ("north", "east", "heading")}
+    belief.initialize(start | {"gyro_bias": np.zeros(COUNT), "odometry_scale": np.ones(COUNT)})
+    recovery, run = AugmentedRecovery(0.02, 0.3), Run([], [])
+    for step in range(STEPS):
+        north, east = (0.0, 0.0) if step < TAKEN else (30.0, -40.0)
+        belief.predict(UnicycleControl(0.0, 0.0), TICK)
+        rings = []
+        for n, e in BEACONS:
+            z = math.hypot(north - n, east - e) + 0.5 * rng.standard_normal()
+            evidence = belief.weigh(sensor, RangeMeasurement(z, n, e))
+            rings.append(Ring(n, e, z, 0.5))
+            if evidence_from == "unnormalised":
+                recovery.observe("range", evidence.log_mean)
+        if evidence_from == "normalised":
+            recovery.observe("range", math.log((belief.weights / belief.weights.sum()).mean()))
+        mean = belief.moments().mean
+        run.errors.append(math.hypot(mean[0] - north, mean[1] - east))
+        run.shares.append(recovery.share)
+        injected = round(recovery.share * COUNT)
+        if injected > 0:
+            belief.inject(Rings(rings).draw(injected, rng))
+        else:
+            belief.resample()
+    return run
+
+
+def kidnapped() -> Figure:
+    """Error and share of a kidnapped belief, with recovery and without."""
+    figure, (above, below) = plt.subplots(
+        2, 1, figsize=(6.8, 4.4), sharex=True, layout="constrained", height_ratios=(3, 2)
+    )
+    time = (np.arange(STEPS) + 1) * TICK
+    for name, colour, line in (
+        ("nothing", GREY, ":"),
+        ("normalised", ORANGE, "--"),
+        ("unnormalised", BLUE, "-"),
+    ):
+        run = kidnapped_run(name)
+        label = "no recovery" if name == "nothing" else f"{name} evidence"
+        above.semilogy(time, run.errors, color=colour, linestyle=line, label=label)
+        if name != "nothing":
+            below.plot(time, run.shares, color=colour, linestyle=line)
+    for axis in (above, below):
+        axis.axvline(TAKEN * TICK, color=RED, linewidth=1)
+    above.text(TAKEN * TICK - 0.2, 30.0, "carried off by 50 m", color=RED, ha="right", va="center")
+    above.set_ylabel("error of the mean, m")
+    above.legend(loc="upper left", bbox_to_anchor=(0.0, 0.8))
+    below.set_ylabel("share drawn anew")
+    below.set_ylim(-0.02, 1.0)
+    below.set_xlabel("time, s (three ranges each 0.1 s, sigma 0.5 m)")
+    return figure
+
+
+def rings() -> Figure:
+    """Places drawn from one range, two, and three, jointly."""
+    places = [Ring(0.0, 0.0, 20.0, 0.8), Ring(5.0, 25.0, 18.0, 0.8), Ring(-22.0, 12.0, 30.0, 0.8)]
+    figure, axes = plt.subplots(1, 3, figsize=(8.6, 3.2), sharey=True, layout="constrained")
+    for number, axis in enumerate(axes, 1):
+        drawn = Rings(places[:number]).draw(1500, np.random.default_rng(1))
+        axis.scatter(
+            drawn["east"], drawn["north"], s=3, color=BLUE, alpha=0.35, linewidths=0, rasterized=True
+        )
+        axis.plot([r.east for r in places[:number]], [r.north for r in places[:number]], "^", color="black")
+        axis.set_title(f"{number} {'range' if number == 1 else 'ranges'}", fontsize=9)
+        axis.set_aspect("equal")
+        axis.set_xlim(-24, 40)
+        axis.set_ylim(-28, 28)
+        axis.set_xlabel("east, m")
+    axes[0].set_ylabel("north, m")
+    return figure
+
+
+def kernels() -> Figure:
+    """A slow state that nothing measures, resampled by random weights 400 times: its spread."""
+    figure, axis = plt.subplots(figsize=(6.8, 3.2), layout="constrained")
+    for name, rule, colour, line in (
+        ("copies only", None, RED, "-"),
+        ("Preserving (Liu and West)", Preserving(), BLUE, "-"),
+        ("Spreading", Spreading(), GREEN, "--"),
+    ):
+        rng = np.random.default_rng(5)
+        belief = ParticleFilter(
+            Unicycle(1.0, 0.0, 0.0, 0.0), capacity=1000, seed=1, slow=[RandomWalk("range_bias", 0.0)]
+        )
+        start = {name: np.zeros(1000) for name in ("north", "east", "heading", "gyro_bias")}
+        belief.initialize(start | {"odometry_scale": np.ones(1000), "range_bias": rng.normal(0.0, 0.3, 1000)})
+        spread = []
+        for _ in range(400):
+            belief.predict(UnicycleControl(0.0, 0.0), 1.0)
+            belief.weigh(Range(5.0, outliers=0.0), RangeMeasurement(100.0, -100.0, 0.0))
+            if rule is None:
+                belief.resample()
+            else:
+                belief.resample_regularized(["range_bias"], rule)
+            spread.append(float(belief.column("range_bias").std()))
+        axis.plot(np.arange(1, 401), spread, color=colour, linestyle=line, label=name)
+    axis.axhline(0.3, color=GREY, linewidth=1, linestyle=":", label="what is known of it")
+    axis.set_xlabel("resamplings")
+    axis.set_ylabel("sigma of a slow state, m")
+    axis.set_ylim(0, None)
+    axis.legend(loc="center right")
+    return figure
+
+
+def draw(folder: Path) -> None:
+    """Write every figure into a folder."""
+    with plt.rc_context(STYLE):
+        figures = {"kidnapped": kidnapped(), "rings": rings(), "kernels": kernels()}
+        for name, figure in figures.items():
+            figure.savefig(folder / f"recovery-{name}.svg", dpi=130, metadata={"Date": None})
+            plt.close(figure)
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
