@@ -79,7 +79,8 @@ class BinnedKernelDensity:
         given = angles.wrap_columns(asked("binned kernel density", points, self._low.size), self.circular)
         last = self._low + self._step * (np.array(self.shape) - 1)
         within = np.asarray((given >= self._low) & (given <= last), np.bool_)
-        inside = (within | self.circular).all(axis=1)
+        inside = np.asarray(np.logical_or(within, self.circular), np.bool_).all(axis=1)
+        inside = np.asarray(inside, np.bool_)
         given = np.where(inside[:, None], given, self._low)
         total = np.zeros(len(given))
         for nodes, share in self._corners(given):
@@ -120,7 +121,10 @@ class BinnedKernelDensity:
         spectrum = np.fft.rfftn(masses)
         for j, (count, step, width) in enumerate(zip(self.shape, self._step, self.bandwidth, strict=True)):
             last = j == len(self.shape) - 1
-            turns: Array = np.fft.rfftfreq(count, step) if last else np.fft.fftfreq(count, step)
+            length = float(step)
+            turns = np.asarray(
+                np.fft.rfftfreq(count, length) if last else np.fft.fftfreq(count, length), np.float64
+            )
             response = np.exp(-0.5 * np.square(angles.TURN * turns) * (width * width - step * step / 3.0))
             spectrum *= response.reshape([-1 if k == j else 1 for k in range(len(self.shape))])
         return np.fft.irfftn(spectrum, self.shape, axes=range(len(self.shape)))
