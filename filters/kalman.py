@@ -238,7 +238,7 @@ def corrected(
     correction = Correction(nu, innovation_covariance, nis, log_evidence, accepted)
     if not accepted:
         return belief, correction
-    gain = np.linalg.solve(innovation_covariance, h @ belief.covariance).T
+    gain: Matrix = np.linalg.solve(innovation_covariance, h @ belief.covariance).T.astype(np.float64)
     return Gaussian(belief.mean + gain @ nu, joseph(belief.covariance, gain, h, spread)), correction
 
 

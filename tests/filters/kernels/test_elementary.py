@@ -123,3 +123,94 @@ def test_log_mixture_of_an_infinite_residual_is_the_outlier_part() -> None:
     out = np.zeros(1, np.float32)
     evaluate_mixture(np.array([np.inf], np.float32), np.float32(-0.05), np.float32(-3.0), out)
     assert out[0] == pytest.approx(-3.0)
+
+
+# ---- errors in units in the last place, as docs/filters/kernels.md has them, on a dense sample of all floats
+
+
+@compiled
+def sines_and_cosines(x: Float32Array, out: Float32Array) -> None:
+    for i in range(x.size):
+        out[0, i] = functions.sine(x[i])
+        out[1, i] = functions.cosine(x[i])
+
+
+def some_floats(least: float, largest: float, stride: int = 4999) -> NDArray[np.float32]:
+    """Every ``stride``-th float32 of a range that does not cross zero, and its ends."""
+    low, high = sorted(int(np.float32(abs(end)).view(np.uint32)) for end in (least, largest))
+    bits = np.append(np.arange(low, high, stride, np.uint32), np.uint32(high))
+    return np.copysign(bits.view(np.float32), np.float32(-1.0 if least < 0.0 else 1.0))
+
+
+def ulps(ours: NDArray[np.float32], truth: NDArray[np.float64]) -> float:
+    """Worst error in units in the last place of the true value."""
+    _, exponent = np.frexp(np.maximum(np.abs(truth), np.finfo(np.float32).smallest_normal))
+    return float((np.abs(ours - truth) / np.ldexp(1.0, exponent - 24)).max())
+
+
+@pytest.mark.parametrize(
+    ("least", "largest", "limit"), [(-1.0, 1.0, 2.7), (-10.0, 10.0, 9.0), (-87.0, 88.0, 65.0)]
+)
+def test_ulps_of_exp(least: float, largest: float, limit: float) -> None:
+    for end in (least, largest):
+        x = some_floats(math.copysign(1e-30, end), end) if end > 0 else some_floats(end, -1e-30)
+        out = np.zeros((6, x.size), np.float32)
+        evaluate(x, out)
+        assert ulps(out[3], np.exp(x.astype(np.float64))) < limit
+
+
+def test_ulps_of_log_and_log1p() -> None:
+    x = np.concatenate([some_floats(1.1754944e-38, 3.4028235e38), some_floats(0.5, 2.0, 13)])
+    out = np.zeros((2, x.size), np.float32)
+    evaluate_positive(x, out)
+    assert ulps(out[0][x != 1.0], np.log(x.astype(np.float64))[x != 1.0]) < 13.6
+    y = some_floats(1e-37, 1.0)
+    out = np.zeros((2, y.size), np.float32)
+    evaluate_positive(y, out)
+    assert ulps(out[1], np.log1p(y.astype(np.float64))) < 61.0
+
+
+def test_ulps_of_sine_and_cosine() -> None:
+    x = some_floats(1e-30, 0.5 * math.pi, 997)
+    out = np.zeros((2, x.size), np.float32)
+    sines_and_cosines(x, out)
+    assert ulps(out[0], np.sin(x.astype(np.float64))) < 2.7
+    near = np.abs(x) <= 1.0
+    assert ulps(out[1][near], np.cos(x[near].astype(np.float64))) < 3.0
+
+
+@pytest.mark.parametrize(
+    ("row", "argument", "result"),
+    [
+        (3, 0.0, 1.0),
+        (3, 1e-40, 1.0),
+        (3, -math.inf, 0.0),
+        (3, math.nan, 0.0),
+        (0, 1e-40, 1e-40),
+        (1, 1e-40, 1.0),
+        (2, 0.0, 0.0),
+    ],
+)
+def test_what_comes_out_at_the_ends(row: int, argument: float, result: float) -> None:
+    out, _ = over(np.array([argument]), evaluate, 6)
+    assert out[row, 0] == np.float32(result)
+
+
+def test_sines_of_what_is_no_angle_are_no_numbers() -> None:
+    out, _ = over(np.array([math.inf, -math.inf, math.nan]), evaluate, 6)
+    assert not np.isfinite(out[:2]).any()
+
+
+def test_huge_angles_lose_digits_slowly() -> None:
+    """Up to 10⁶ rad as within the range, up to 10⁷ to 1e-4."""
+    for limit, tolerance in ((1e6, 1e-5), (1e7, 1e-3)):
+        out, x = over(np.linspace(-limit, limit, 100_001), evaluate, 6)
+        assert np.abs(out[0] - np.sin(x)).max() < tolerance
+        assert np.abs(out[1] - np.cos(x)).max() < tolerance
+
+
+def test_log_of_nothing_is_the_least_there_is() -> None:
+    """Zero and subnormal numbers: about -88, not minus infinity; log1p of a subnormal number is itself."""
+    out, _ = over(np.array([0.0, 1e-40]), evaluate_positive, 2)
+    assert (np.abs(out[0] + 88.0) < 0.1).all()
+    assert out[1].tolist() == np.array([0.0, 1e-40], np.float32).tolist()
