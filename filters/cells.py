@@ -23,7 +23,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from filters.grid import Array, Columns, LogDensity
+from filters.grid import Array, Columns, LogDensity, broadcasts
 from filters.kernels import histogram as kernels
 
 
@@ -154,11 +154,7 @@ def log_mean(function: LogDensity, centres: Columns, widths: Columns | Array, no
 
 
 def _checked_logs(logs: Array, shape: tuple[int, ...]) -> Array:
-    try:
-        fits = np.broadcast_shapes(logs.shape, shape) == shape
-    except ValueError:
-        fits = False
-    if not fits:
+    if not broadcasts(logs.shape, shape):
         raise ValueError(
             f"log likelihood: one number for each cell, {shape}, or what broadcasts to it, is needed; "
             f"got {logs.shape}"

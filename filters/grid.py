@@ -145,6 +145,12 @@ class Grid:
         return np.where(inside, flat, -1)
 
 
+def broadcasts(shape: tuple[int, ...], goal: tuple[int, ...]) -> bool:
+    """Say whether an array of one shape can be broadcast to another."""
+    aligned = zip(reversed(shape), reversed(goal), strict=False)
+    return len(shape) <= len(goal) and all(size in (1, wanted) for size, wanted in aligned)
+
+
 def checked_points(where: str, points: ArrayLike, dimension: int) -> Array:
     """Return points as (n, dimension) float64.
 

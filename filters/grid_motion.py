@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from filters.cells import Cells
-from filters.grid import MOST_AXES, Array, Columns, Grid, Indices
+from filters.grid import MOST_AXES, Array, Columns, Grid, Indices, broadcasts
 from filters.kernels import histogram as kernels
 
 Move = Callable[[Columns], Sequence[ArrayLike]]
@@ -23,6 +23,9 @@ Move = Callable[[Columns], Sequence[ArrayLike]]
 
 TAIL = 7.0
 """Standard deviations of the noise that are followed; beyond lie 3e-12, dealt to the cells within."""
+
+SHARP = 1e-6
+"""Noise of at most this many cell widths is none: all goes to the cell that the mean lies in."""
 
 BLOCK = 16_384
 
@@ -167,7 +170,8 @@ class GridMotion:
         return places, self._cells.shares(distances, along.width, sigma)
 
     def _window(self, axis: int, sigma: float) -> int:
-        return 2 * math.ceil(TAIL * sigma / self.grid.axes[axis].width) + 1
+        width = self.grid.axes[axis].width
+        return 1 if sigma <= SHARP * width else 2 * math.ceil(TAIL * sigma / width) + 1
 
     def _moved(self, move: Move, states: list[Array]) -> list[Array]:
         moved = [np.asarray(column, np.float64) for column in move(states)]
@@ -175,7 +179,7 @@ class GridMotion:
         if len(moved) != self.grid.dimension:
             raise ValueError(f"histogram motion: {self.grid.dimension} columns are needed, got {len(moved)}")
         for column in moved:
-            if np.broadcast_shapes(column.shape, shape) != shape:
+            if not broadcasts(column.shape, shape):
                 raise ValueError(f"histogram motion: columns of {shape} are needed, got {column.shape}")
             if not np.isfinite(column).all():
                 raise ValueError(

@@ -24,7 +24,7 @@ from filters.density.protocol import DensityMoments
 from filters.grid import Array, Grid, Indices, LogDensity, box_moments
 from filters.grid_motion import GridMotion, Move
 
-REST_SAMPLE = 4_096
+REST_SAMPLE = 1_024
 _SMALLEST = 1e-200
 
 
@@ -67,9 +67,10 @@ class HistogramFilter:
         self._belief: Array = np.full(grid.shape, 1.0 / grid.size)
         self._spare: Array = np.empty(grid.shape)
         self._every: Indices = np.arange(grid.size)
-        golden = 0.5 * (math.sqrt(5.0) - 1.0)
-        spaced = np.mod(np.arange(1, min(REST_SAMPLE, grid.size) + 1) * golden, 1.0)
-        self._sample: Indices = np.unique((spaced * grid.size).astype(np.int64))
+        self._sample: Indices = self._every
+        if grid.size > REST_SAMPLE:  # spaced by the golden ratio, so that no axis is sampled in step
+            turns = np.arange(1, REST_SAMPLE + 1) * (0.5 * (math.sqrt(5.0) - 1.0))
+            self._sample = np.unique((np.mod(turns, 1.0) * grid.size).astype(np.int64))
 
     @property
     def belief(self) -> Array:
@@ -206,7 +207,7 @@ class HistogramFilter:
     def _weigh_chosen(self, log_likelihood: LogDensity, chosen: Indices) -> float:
         flat = self._belief.reshape(-1)
         masses = flat[chosen]
-        sampled = self._sample[flat[self._sample] <= masses.min()]
+        sampled = self._sample[flat[self._sample] <= self._threshold()]
         logs = self._log_likelihoods(log_likelihood, chosen)
         rest_logs = self._log_likelihoods(log_likelihood, sampled)
         self.touched = chosen.size + sampled.size
@@ -236,7 +237,10 @@ class HistogramFilter:
         """Flat indices of the cells that are moved and weighed one by one."""
         if self.share == 0.0:
             return self._every
-        return np.flatnonzero(self._belief > self.share * self._belief.max())
+        return np.flatnonzero(self._belief > self._threshold())
+
+    def _threshold(self) -> float:
+        return self.share * float(self._belief.max())
 
     # --- what the belief says -----------------------------------------------------------------------------------
 
