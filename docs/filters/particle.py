@@ -138,10 +138,10 @@ def still() -> Figure:
     """Resampling a state that does not move and of which nothing is measured: how many values are left."""
     figure, axis = plt.subplots(figsize=(6.8, 3.0), layout="constrained")
     rng = np.random.default_rng(4)
-    for name, scheme, colour, line in (
-        ("always, multinomial", multinomial, RED, "-"),
-        ("always, Table 4.4", systematic, BLUE, "--"),
-        ("never", None, GREEN, ":"),
+    for name, scheme, colour, line, width in (
+        ("never", None, "#a6dba0", "-", 5.0),
+        ("always, Table 4.4", systematic, BLUE, "--", 1.6),
+        ("always, multinomial", multinomial, RED, "-", 1.6),
     ):
         values = np.arange(1000)
         left = [1000]
@@ -149,7 +149,7 @@ def still() -> Figure:
             if scheme is not None:
                 values = values[scheme(np.ones(1000, np.float32), 1000, 1.0 - rng.random())]
             left.append(np.unique(values).size)
-        axis.loglog(np.arange(1, 3002), left, color=colour, linestyle=line, linewidth=1.6, label=name)
+        axis.loglog(np.arange(1, 3002), left, color=colour, linestyle=line, linewidth=width, label=name)
     axis.set_xlabel("resamplings")
     axis.set_ylabel("different particles of 1,000")
     axis.legend(loc="lower left")

@@ -123,34 +123,38 @@ def rings() -> Figure:
 
 
 def kernels() -> Figure:
-    """A slow state that nothing measures, resampled by random weights 400 times: its spread."""
-    figure, axis = plt.subplots(figsize=(6.8, 3.2), layout="constrained")
-    for name, rule, colour, line in (
+    """A slow state that nothing measures, resampled by what the pose measured: its values and their spread."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.2, 3.1), layout="constrained")
+    for label, rule, colour, line in (
         ("copies only", None, RED, "-"),
-        ("Preserving (Liu and West)", Preserving(), BLUE, "-"),
         ("Spreading", Spreading(), GREEN, "--"),
+        ("Preserving", Preserving(), BLUE, "-"),
     ):
         rng = np.random.default_rng(5)
         belief = ParticleFilter(
-            Unicycle(1.0, 0.0, 0.0, 0.0), capacity=1000, seed=1, slow=[RandomWalk("range_bias", 0.0)]
+            Unicycle(1.0, 0.0, 0.0, 0.0), capacity=200, seed=1, slow=[RandomWalk("range_bias", 0.0)]
         )
-        start = {name: np.zeros(1000) for name in ("north", "east", "heading", "gyro_bias")}
-        belief.initialize(start | {"odometry_scale": np.ones(1000), "range_bias": rng.normal(0.0, 0.3, 1000)})
-        spread = []
-        for _ in range(400):
+        start = {name: np.zeros(200) for name in ("north", "east", "heading", "gyro_bias")}
+        belief.initialize(start | {"odometry_scale": np.ones(200), "range_bias": rng.normal(0.0, 0.3, 200)})
+        values, spread = [200], [0.3]
+        for _ in range(300):
             belief.predict(UnicycleControl(0.0, 0.0), 1.0)
-            belief.weigh(Range(5.0, outliers=0.0), RangeMeasurement(100.0, -100.0, 0.0))
+            belief.weigh(Range(0.3, outliers=0.0), RangeMeasurement(100.0, -100.0, 0.0))
             if rule is None:
                 belief.resample()
             else:
                 belief.resample_regularized(["range_bias"], rule)
+            values.append(np.unique(belief.column("range_bias")).size)
             spread.append(float(belief.column("range_bias").std()))
-        axis.plot(np.arange(1, 401), spread, color=colour, linestyle=line, label=name)
-    axis.axhline(0.3, color=GREY, linewidth=1, linestyle=":", label="what is known of it")
-    axis.set_xlabel("resamplings")
-    axis.set_ylabel("sigma of a slow state, m")
-    axis.set_ylim(0, None)
-    axis.legend(loc="center right")
+        left.semilogy(values, color=colour, linestyle=line, label=label)
+        right.semilogy(spread, color=colour, linestyle=line)
+    right.axhline(0.3, color=GREY, linewidth=1, linestyle=":")
+    right.set_ylim(1e-2, 30.0)
+    left.set_ylabel("different values of 200")
+    right.set_ylabel("sigma of the slow state, m")
+    for axis in (left, right):
+        axis.set_xlabel("resamplings")
+    left.legend(loc="center right")
     return figure
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy import int64, uint64
+from numpy import float64, int64, uint64
 from numpy.typing import NDArray
 
 from filters.kernels.compile import Float32Array, Int32Array, function, kernel
@@ -26,9 +26,9 @@ def bin_key(
     north: float, east: float, heading: float, per_north: float, per_east: float, per_heading: float
 ) -> np.int64:
     """The bin of a pose as one number, 21 bits per dimension: bins two million apart share it."""
-    n = int64(math.floor(north * per_north)) & int64(0x1FFFFF)
-    e = int64(math.floor(east * per_east)) & int64(0x1FFFFF)
-    h = int64(math.floor((heading + math.pi) * per_heading)) & int64(0x1FFFFF)
+    n = int64(math.floor(float64(north) * per_north)) & int64(0x1FFFFF)
+    e = int64(math.floor(float64(east) * per_east)) & int64(0x1FFFFF)
+    h = int64(math.floor((float64(heading) + math.pi) * per_heading)) & int64(0x1FFFFF)
     return int64(int64(n << int64(42)) | int64(e << int64(21)) | h)
 
 

@@ -35,7 +35,7 @@ def systematic(weights: Float32Array, total: float, uniform: float, ancestors: I
     for i in range(weights.size):
         if end < count:  # a source without a copy is overwritten by the next
             ancestors[np.uint64(end)] = i
-        cumulative += weights[i]
+        cumulative += np.float64(weights[i])
         end = min(count, int(cumulative * scale + 1.0 - uniform))
     if end < count:
         i = weights.size - 1

@@ -73,7 +73,7 @@ def multinomial(weights: Float32Array, total: float, key: int, other_key: int, a
         place = gone * scale
         while place > cumulative and i < last:
             i += 1
-            cumulative += weights[i]
+            cumulative += float64(weights[i])
         ancestors[m] = i
 
 
@@ -89,7 +89,7 @@ def stratified(weights: Float32Array, total: float, key: int, other_key: int, an
         place = (m + number(m, key, other_key)) * step
         while place > cumulative and i < last:
             i += 1
-            cumulative += weights[i]
+            cumulative += float64(weights[i])
         ancestors[m] = i
 
 
@@ -103,7 +103,7 @@ def residual(weights: Float32Array, total: float, key: int, other_key: int, ance
     last = last_weighted(weights)
     fractional = -1
     for i in range(weights.size):
-        expected = weights[i] * scale
+        expected = float64(weights[i]) * scale
         copies = math.floor(expected)
         certain += int64(copies)
         remainder += expected - copies
@@ -121,7 +121,7 @@ def residual(weights: Float32Array, total: float, key: int, other_key: int, ance
     cumulative = 0.0
     m = 0
     for i in range(weights.size):
-        expected = weights[i] * scale
+        expected = float64(weights[i]) * scale
         copies = math.floor(expected)
         cumulative += expected - copies
         end = min(count, m + int64(copies))
@@ -160,7 +160,7 @@ def within(
         quota = quotas[label]
         if quota == 0 or weights[i] <= 0.0:
             continue
-        cumulative[label] += weights[i]
+        cumulative[label] += float64(weights[i])
         end = min(quota, int64(cumulative[label] * (quota / masses[label]) + 1.0 - uniforms[label]))
         if i == last[label]:
             end = quota

@@ -163,7 +163,7 @@ class Outcome:
 
 
 def test_a_kidnapped_belief_finds_back() -> None:
-    """Expected: next to nothing is injected while all is well; within 6 s of the kidnapping the error is below 1 m."""
+    """Expected: next to nothing is injected while all is well; 4 s after the kidnapping the error is below 1 m."""
     for seed in range(3):
         outcome = Outcome(recovers=True, normalised=False, seed=seed)
         assert max(outcome.errors[10:TAKEN]) < 1.0
