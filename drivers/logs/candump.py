@@ -38,19 +38,18 @@ def parse(line: bytes) -> LoggedFrame | None:
     match = _LINE.fullmatch(line)
     if match is None:
         raise ValueError("bad_line")
-    identifier = int(match["identifier"], 16)
+    seconds, fraction, channel, digits, flags, remote, content = match.groups()
+    identifier = int(digits, 16)
     if identifier & _ERROR_FRAME:
         raise ValueError("error_frame")
-    if match["remote"] is not None:
+    if remote is not None:
         return None
-    data = bytes.fromhex(match["data"].decode())
-    flexible = match["flags"] is not None
+    data = bytes.fromhex(content.decode())
+    flexible = flags is not None
     if len(data) > (_LARGEST_FLEXIBLE if flexible else _LARGEST_CLASSIC):
         raise ValueError("bad_line")
-    extended = len(match["identifier"]) > _STANDARD_DIGITS
-    time_ns = int(match["seconds"]) * 1_000_000_000 + int(match["fraction"].ljust(9, b"0"))
-    frame = CanFrame(identifier & _EXTENDED_MASK, data, extended, flexible)
-    return LoggedFrame(time_ns, match["channel"].decode(errors="replace"), frame)
+    frame = CanFrame(identifier & _EXTENDED_MASK, data, len(digits) > _STANDARD_DIGITS, flexible)
+    return LoggedFrame(int(seconds + fraction.ljust(9, b"0")), channel.decode(errors="replace"), frame)
 
 
 def frames(file: BinaryIO, tally: Tally) -> Iterator[LoggedFrame]:

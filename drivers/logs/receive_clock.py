@@ -72,7 +72,10 @@ def on_clock(entries: Iterable[tuple[int, Entry]], faults: Counter[str]) -> Iter
         return
     clock = ReceiveClock([stamp for stamp, _ in ahead])
     clock.faults = faults
+    for following in source:
+        stamp, entry = ahead.popleft()
+        ahead.append(following)
+        yield clock.read(stamp, ahead[0][0]), entry
     while ahead:
         stamp, entry = ahead.popleft()
-        ahead.extend(islice(source, 1))
         yield clock.read(stamp, ahead[0][0] if ahead else None), entry

@@ -63,7 +63,7 @@ def _faults(signal: Table, database: Database) -> Iterator[tuple[str, str]]:
         return
     facts = message.signals.get(inner)
     if facts is None:
-        there = did_you_mean(inner, message.signals) or f"; it has {', '.join(message.signals)}"
+        there = did_you_mean(inner, message.signals) or f"; it has {', '.join(sorted(message.signals))}"
         yield "signal", f"message {message_name} in {file} has no signal {shown(inner)}" + there
         return
     yield from _unit_not_known(signal, facts)

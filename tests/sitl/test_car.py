@@ -1,0 +1,32 @@
+"""A minute of a real car by candump and DBC, with its GNSS beside it: the whole way from bytes to estimates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from service.config import load
+from service.replay import Plan, replay
+from service.score import read_truth
+from tests.sitl import car
+
+pytestmark = [pytest.mark.recordings, pytest.mark.slow]
+
+
+@pytest.mark.parametrize("recording", ["comma2k19_seg40.candump.gz"], indirect=True)
+def test_wheels_and_yaw_rate_of_a_car_by_dbc(recording: Path, tmp_path: Path) -> None:
+    """Four wheels and the yaw rate as odometry: the bias and the scale that others found, within three sigmas."""
+    configuration = load(car.configuration(tmp_path, recording))
+    logs = (recording, car.gnss(tmp_path, recording))
+    run = replay(Plan(logs, configuration, 5000, read_truth(car.truth(tmp_path, recording))), seed=0)
+    bus, receiver = run.links
+    assert (bus.messages, bus.samples, bus.malformed, bus.ignored) == (9_948, 9_948, {}, 135_468 - 9_948)
+    assert receiver.messages == 579
+    assert run.score.rmse_m is not None
+    assert run.score.rmse_m <= 2.5  # the receiver alone: 1.5, late and offset
+    bias, sigma = run.biases["gyro_bias"]
+    assert bias == pytest.approx(0.0070, abs=3 * sigma)
+    scale, sigma = run.biases["odometry_scale"]
+    assert scale == pytest.approx(1 / 0.9916, abs=3 * sigma)
+    assert run.health.get("tracking", 0.0) > 0.9
