@@ -137,8 +137,10 @@ def equal_error() -> Figure:
             leaf_counts, tree_errors[:, column], color=BLUE, marker="o", markersize=4, label="density tree"
         )
         axis.set_xlabel("cells or leaves")
-        axis.set_ylabel(f"{label} from the posterior")
-    axes[0].legend(loc="lower left")
+        axis.set_ylabel(label)
+    axes[0].set_yticks([0.05, 0.1, 0.2, 0.5], ["0.05", "0.1", "0.2", "0.5"])
+    axes[0].minorticks_off()
+    axes[0].legend(loc="upper right")
     return figure
 
 
