@@ -42,14 +42,15 @@ class ReceiveClock:
 
     def _judge(self, time: int, following: int | None) -> int:
         last = self._last
+        if 0 < last - time <= OUT_OF_ORDER:
+            return last
         if following is not None and 0 <= following + self._shift - last <= LONGEST_GAP:
             self.faults["bad_stamp"] += 1
             return last
         if time > last:
             return time
-        if last - time > OUT_OF_ORDER:
-            self.faults["clock_step"] += 1
-            self._shift += last - time
+        self.faults["clock_step"] += 1
+        self._shift += last - time
         return last
 
 

@@ -125,7 +125,7 @@ def test_a_truncated_and_damaged_log_replays_around_the_damage(drive: Path, tmp_
 def test_a_file_that_is_no_log_is_refused_in_words(tmp_path: Path) -> None:
     strange = tmp_path / "log.xyz"
     strange.write_text("hello")
-    with pytest.raises(LogError, match="known endings"):
+    with pytest.raises(LogError, match="cannot tell what log this is"):
         setting_of((strange,), None, None)
     empty = tmp_path / "empty.tlog"
     empty.write_bytes(b"")
