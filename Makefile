@@ -47,8 +47,9 @@ docs: $(INSTALLED) ## the pages that are generated
 	$(BIN)/python -m service.config.reference > docs/configuration.md
 	$(BIN)/python -m service.publish.reference > docs/wire.md
 
-figures: install ## the figures of docs/filters.md, from the filters themselves
-	NUMBA_CACHE_DIR=$$($(BIN)/python -c 'from service import kernels; print(kernels.prepare())') $(BIN)/python docs/figures.py
+figures: install ## the figures of docs/filters/, from the filters themselves
+	NUMBA_CACHE_DIR=$$($(BIN)/python -c 'from service import kernels; print(kernels.prepare())') PYTHONPATH=. $(BIN)/python docs/figures.py
+	$(BIN)/beliefd textbook --out docs/filters/textbook
 
 clean: ## remove everything that was made
 	rm -rf $(VENV) .vm build dist .pytest_cache .ruff_cache .hypothesis .coverage

@@ -52,7 +52,13 @@ def figure_4_5() -> Figure:
     for axis, (name, title) in zip(axes.flat, titles.items(), strict=True):
         axis.fill_between(shown.y, shown.exact, color=GREY, alpha=0.25, linewidth=0)
         axis.plot(
-            shown.particles, np.full(shown.particles.size, -0.035), "|", color=BLUE, alpha=0.3, markersize=6
+            shown.particles,
+            np.full(shown.particles.size, -0.035),
+            "|",
+            color=BLUE,
+            alpha=0.3,
+            markersize=6,
+            rasterized=True,
         )
         kept = f"{shown.particles.size} particles"
         if name != "particles":
@@ -101,7 +107,9 @@ def hypotheses() -> Figure:
     points, circular = two_places(), [False, False, True]
     figure, axes = plt.subplots(1, 2, figsize=(8.0, 4.3), sharex=True, sharey=True, layout="constrained")
     for axis in axes:
-        axis.scatter(points[::2, 1], points[::2, 0], s=3, color=BLUE, alpha=0.25, linewidths=0)
+        axis.scatter(
+            points[::2, 1], points[::2, 0], s=3, color=BLUE, alpha=0.25, linewidths=0, rasterized=True
+        )
         axis.plot([-4.0, 30.0], [0.0, 0.0], "^", color="black", markersize=7)
         axis.set_xlabel("east, m")
         axis.set_aspect("equal")

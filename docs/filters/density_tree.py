@@ -85,6 +85,7 @@ def leaves() -> Figure:
             linewidth=0.3,
         )
         boxes.set_array(np.sqrt(density / density.max()))
+        boxes.set_rasterized(True)  # thousands of outlines
         axis.add_collection(boxes)
         axis.grid(visible=False)
         axis.set_aspect("equal")
@@ -171,7 +172,7 @@ def draw(folder: Path) -> None:
     """Write the figures into a folder."""
     with plt.rc_context(STYLE):
         for name, figure in (("leaves", leaves()), ("error", equal_error()), ("lookup", lookup())):
-            figure.savefig(folder / f"density-tree-{name}.svg", metadata={"Date": None})
+            figure.savefig(folder / f"density-tree-{name}.svg", dpi=150, metadata={"Date": None})
             plt.close(figure)
 
 

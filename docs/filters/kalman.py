@@ -119,7 +119,7 @@ def shadow(folder: Path) -> None:
         f"kept out by the gate: {good.rejections} of {TICKS} from the near start, {wide.rejections} from the far one"
     )
     for axis, look, cloud in zip(axes[1:], LOOKS, wide.clouds, strict=True):
-        axis.scatter(cloud[:, 1], cloud[:, 0], s=4, color=BLUE, alpha=0.3, linewidths=0)
+        axis.scatter(cloud[:, 1], cloud[:, 0], s=4, color=BLUE, alpha=0.3, linewidths=0, rasterized=True)
         axis.plot(wide.truth[:look, 1], wide.truth[:look, 0], color=RED, linewidth=1)
         axis.plot(wide.truth[look - 1, 1], wide.truth[look - 1, 0], "x", color=RED, markersize=7)
         axis.plot(wide.shadow_mean[:look, 1], wide.shadow_mean[:look, 0], color=ORANGE, linewidth=1)

@@ -28,7 +28,7 @@ REACH = (28.0, 11.0)
 """How far the grid goes on either side in q and v, metres and metres per second: five standard deviations at t = 5."""
 WIDTH = 0.5
 """Of a cell along both, metres and metres per second."""
-WIDTHS = (4.0, 2.0, 1.0, 0.5, 0.25)
+WIDTHS = (4.0, 2.0, 1.0, 0.5)
 SHEAR = np.array([[1.0, 0.5], [0.0, 1.0]])
 """(x, v) from (q, v)."""
 RULES: dict[str, Cells] = {"cell means": CellMean(), "cell integrals": CellIntegral(2)}

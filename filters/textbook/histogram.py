@@ -25,7 +25,7 @@ CELLS = 10
 POINTS = 8
 """That each cell of X is represented by."""
 COUNTS = (5, 10, 20, 40, 80, 160, 320, 640)
-_FINE = 32
+_FINE = 16
 
 
 @dataclass(frozen=True)

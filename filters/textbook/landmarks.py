@@ -154,4 +154,4 @@ def _weigh(
 
 def _stage(name: str, belief: ParticleFilter[UnicycleControl], truth: NDArray[np.float64]) -> Stage:
     moments = belief.moments()
-    return Stage(name, truth, belief.cloud(2_000).copy(), moments.mean[:2])
+    return Stage(name, truth, belief.cloud(1_200).copy(), moments.mean[:2])

@@ -19,7 +19,7 @@ from filters.textbook.normal import Vector
 from filters.tree_nodes import Side
 
 SPAN = (-4.0, 6.0)
-CELLS = 10
+CELLS = 20
 COUNTS = (5, 10, 20, 40, 80, 160, 320)
 _FINEST = 2e-3
 _COARSEST = 2.5

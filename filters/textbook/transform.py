@@ -29,7 +29,8 @@ AMPLITUDE = 0.6 / WAVES
 """a, so that g' lies in 0.4 to 1.6."""
 PHASE = 0.5
 """φ, which makes the humps unequal."""
-_STEPS = 60
+_HALVINGS = 7
+_NEWTON = 4
 
 
 def function(x: ArrayLike) -> Vector:
@@ -44,14 +45,17 @@ def slope(x: ArrayLike) -> Vector:
 
 
 def inverse(y: ArrayLike) -> Vector:
-    """Return g⁻¹(y), by halving the interval that must hold it: g(x) - x lies within ± a."""
+    """Return g⁻¹(y): the interval that must hold it, for g(x) - x lies within ± a, is halved; then Newton's steps."""
     y = np.asarray(y, np.float64)
     low, high = y - AMPLITUDE, y + AMPLITUDE
-    for _ in range(_STEPS):
+    for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         below = function(middle) < y
         low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return 0.5 * (low + high)
+    x = 0.5 * (low + high)
+    for _ in range(_NEWTON):
+        x = x - (function(x) - y) / slope(x)
+    return x
 
 
 def density(y: ArrayLike) -> Vector:

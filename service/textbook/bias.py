@@ -32,7 +32,7 @@ def few() -> Exhibit:
         _COUNTS, tried, error, fmt=".", color=ORANGE, capsize=2, label=f"{_RUNS:,} runs, ± 2 standard errors"
     )
     label(left, "what the particles hold after z", "particles M", "probability that the door is open")
-    left.set_ylim(0.45, 0.8)
+    left.set_ylim(0.3, 0.8)
     left.legend(loc="lower right")
     right.loglog(_COUNTS, bayes - exact, "o-", color=BLUE, markersize=5, label="bias")
     reference = (bayes - exact[-1]) * _COUNTS[-1] / np.array(_COUNTS)

@@ -16,7 +16,7 @@ def robot() -> Exhibit:
     shown = panels(figure, 2, 4)
     for axis, stage in zip(shown, stages, strict=False):
         north, east, _, weight = stage.cloud.astype(np.float64).T
-        cloud(axis, east, north, np.maximum(0.5 * weight / weight.max(), 0.02), BLUE)
+        cloud(axis, east, north, 0.5 * np.sqrt(weight / weight.max()), BLUE)
         axis.plot(*np.array(landmarks.LANDMARKS).T[::-1], "^", color="black", markersize=5)
         axis.plot(stage.truth[1], stage.truth[0], "x", color=RED, markersize=7, markeredgewidth=1.6)
         axis.plot(stage.estimate[1], stage.estimate[0], "+", color=GREEN, markersize=8, markeredgewidth=1.6)

@@ -36,7 +36,7 @@ def decompositions() -> Exhibit:
 
 
 def _draw(axis: Axes, part: Partition, title: str, colour: str) -> None:
-    fine = np.linspace(*partition.SPAN, 1001)
+    fine = np.linspace(*partition.SPAN, 501)
     axis.fill_between(fine, transform.density(fine), color=PALE, linewidth=0, label="exact")
     steps(axis, part.edges, part.probabilities / np.diff(part.edges), colour, "cells")
     axis.vlines(part.edges, -0.06, 0.0, color=colour, linewidth=0.8)

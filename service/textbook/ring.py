@@ -23,8 +23,8 @@ def histogram() -> Exhibit:
     """Exercise 2."""
     exact, extended, found = ring.exact(), ring.extended(), ring_histogram.histogram()
     resolved = ring_histogram.resolution()
-    figure: Any = sheet(9.6, 6.6)
-    above, below = figure.subfigures(2, 1, height_ratios=(3, 2.5))
+    figure: Any = sheet(9.6, 8.2)
+    above, below = figure.subfigures(2, 1, height_ratios=(3, 4.4))
     before, after, accuracy = panels(above, 1, 3)
     side = found.grid.axes[0]
     edges = np.linspace(side.low, side.high, side.cells + 1)
@@ -46,20 +46,22 @@ def histogram() -> Exhibit:
     label(accuracy, "after the motion: distance from exact", "cells of the heading", "wrong probability")
     accuracy.legend()
     per_slice = found.grid.shape[2] // _SLICES
-    top = float(found.corrected.max()) * 4.0
-    shown = panels(below, 2, _SLICES // 2, sharex=True, sharey=True)
-    for place, axis in enumerate(shown):
+    below.suptitle("by heading: after the motion (blue), after z (red)", fontsize=9)
+    centres = side.centres
+    top = float(found.corrected.max())
+    for place, axis in enumerate(panels(below, 2, _SLICES // 2, sharex=True, sharey=True)):
         chosen = slice(place * per_slice, (place + 1) * per_slice)
-        axis.pcolormesh(
-            edges, edges, found.corrected[:, :, chosen].sum(axis=2).T, cmap="Blues", vmax=top, rasterized=True
+        moved = found.predicted[:, :, chosen].sum(axis=2)
+        axis.pcolormesh(edges, edges, moved.T, cmap="Blues", rasterized=True)
+        measured = found.corrected[:, :, chosen].sum(axis=2)
+        axis.contour(
+            centres, centres, measured.T, levels=[0.5 * top, 2.0 * top], colors=[RED], linewidths=1.0
         )
         first = -180.0 + place * 360.0 / _SLICES
-        axis.set_title(f"heading {first:.0f}° to {first + 360.0 / _SLICES:.0f}°, after z")
+        label(axis, f"{first:.0f}° to {first + 360.0 / _SLICES:.0f}°", "x, m", "y, m")
         axis.set_aspect("equal")
         axis.set_xlim(-_REACH, _REACH)
         axis.set_ylim(-_REACH, _REACH)
-        axis.set_xlabel("x, m")
-        axis.set_ylabel("y, m")
     rows = [
         (number(width), str(headings), f"{cells:,}", number(float(first), 3), number(float(second), 3))
         for width, *rest in zip(resolved.widths, resolved.cells, resolved.distances, strict=True)

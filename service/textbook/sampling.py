@@ -6,7 +6,7 @@ import numpy as np
 
 from filters.textbook import comb, importance, wheel
 from service.textbook.exhibit import Exhibit, Table, number, vector
-from service.textbook.style import BLUE, GREEN, GREY, ORANGE, PALE, RED, label, panels, sheet
+from service.textbook.style import BLUE, GREEN, GREY, ORANGE, PALE, RED, label, panels, rug, sheet
 
 _STRETCHES = (BLUE, ORANGE, GREEN, GREY)
 
@@ -22,13 +22,13 @@ def target() -> Exhibit:
         axis.plot(x, importance.target(x), color=RED, linewidth=1.4, label="target f")
     first.axvspan(*importance.INTERVAL, color=PALE, alpha=0.6, linewidth=0, label="interval A")
     second.plot(x, importance.proposal(x), color=BLUE, linewidth=1.4, label="proposal g")
-    second.vlines(found.samples, -0.03, -0.01, color=BLUE, linewidth=0.8)
+    rug(second, found.samples, (-0.03, -0.01))
     third.vlines(found.samples, 0.0, 0.2 * found.weights / found.weights.max(), color=BLUE, linewidth=1.0)
     third.plot([], [], color=BLUE, label="weight f/g, scaled")
     titles = ("(a) the target", "(b) what can be sampled", "(c) weights make up the difference")
     for axis, title in zip((first, second, third), titles, strict=True):
         label(axis, title, "x", "density")
-        axis.set_ylim(-0.04, 0.4)
+        axis.set_ylim(-0.04, 0.47)
         axis.set_xlim(-1.0, 9.0)
         axis.legend(loc="upper left")
     for error, colour in zip(errors, (BLUE, ORANGE), strict=True):
@@ -73,11 +73,11 @@ def teeth() -> Exhibit:
         axis,
         "the weights end to end, and where the comb's teeth fall",
         "cumulative weight",
-        "copies   weights   teeth",
+        "from teeth to copies",
     )
     axis.set_ylim(-0.6, 1.35)
     axis.set_xlim(-0.005, 1.005)
-    axis.set_yticks([])
+    axis.set_yticks([-0.42, 0.0, 0.68], ["copies", "particle", "teeth u"])
     axis.grid(visible=False)
     rows = [
         (str(i + 1), number(float(weight)), number(float(weight) * found.teeth.size), str(copies))
@@ -101,7 +101,7 @@ def wheels() -> Exhibit:
         left.loglog(
             chances, seen, marker, color=colour, markersize=4, fillstyle="none", label=comparison.name
         )
-        curve = wheel.sweep(comparison.name, largest)
+        curve = wheel.sweep(comparison.name, largest, batches=15_000)
         right.semilogy(2.0 * largest, curve, color=colour, label=comparison.name)
     left.plot([1e-4, 0.2], [1e-4, 0.2], color=RED, linewidth=0.8)
     label(left, "every outcome of four draws", "probability, multinomial", "share of the draws")

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 
 from filters.textbook import extraction, histogram, normal, particles, transform
 from service.textbook.exhibit import Exhibit, Table, number
-from service.textbook.style import BLUE, GREEN, GREY, ORANGE, PALE, RED, label, panels, sheet, steps
+from service.textbook.style import BLUE, GREEN, GREY, ORANGE, PALE, RED, label, panels, rug, sheet, steps
 
 _SPAN = (-1.0, 3.0)
-_FINE = np.linspace(*_SPAN, 801)
+_FINE = np.linspace(*_SPAN, 301)
 
 
 def cells() -> Exhibit:
@@ -50,8 +50,8 @@ def samples() -> Exhibit:
     found = particles.passing()
     count = found.x.size
     foot = 0.035
-    source.vlines(found.x, -2.0 * foot, -foot, color=BLUE, linewidth=0.5, alpha=0.6)
-    image.hlines(found.y, -2.0 * foot, -foot, color=BLUE, linewidth=0.5, alpha=0.6)
+    rug(source, found.x, (-2.0 * foot, -foot))
+    rug(image, found.y, (-2.0 * foot, -foot), upright=False)
     cumulative.step(np.sort(found.y), (np.arange(count) + 1.0) / count, where="post", color=BLUE, linewidth=1)
     cumulative.plot(_FINE, transform.cumulative(_FINE), color=RED, linewidth=1)
     cumulative.plot([], [], color=BLUE, label=f"{count} particles")
@@ -71,7 +71,7 @@ def samples() -> Exhibit:
 
 def densities() -> Exhibit:
     """Figure 4.5."""
-    found = extraction.extraction()
+    found = extraction.extraction(points=601)
     figure = sheet(9.6, 5.4)
     shown = panels(figure, 2, 3, sharex=True, sharey=True)
     titles = {
@@ -85,7 +85,7 @@ def densities() -> Exhibit:
     for axis, (name, title) in zip(shown, titles.items(), strict=True):
         axis.fill_between(found.y, found.exact, color=PALE, linewidth=0, label="exact")
         if name == "particles":
-            axis.vlines(found.particles, -0.08, -0.03, color=BLUE, linewidth=0.4, alpha=0.6)
+            rug(axis, found.particles, (-0.08, -0.03))
         else:
             axis.plot(found.y, found.densities[name], color=BLUE, linewidth=1.2, label="extracted")
         if name == "gaussian":
@@ -112,7 +112,7 @@ def chance() -> Exhibit:
             axis = figure.add_subplot(grid[row, column])
             axis.fill_between(drawn.y, transform.density(drawn.y), color=PALE, linewidth=0)
             axis.plot(drawn.y, density, color=BLUE, linewidth=1.2)
-            axis.vlines(points, -0.08, -0.03, color=BLUE, linewidth=0.6, alpha=0.6)
+            rug(axis, points, (-0.08, -0.03))
             label(axis, f"{count} particles, draw {column + 1}", "y", "density")
             axis.set_ylim(-0.1, 1.1)
             axis.set_xlim(*_SPAN)

@@ -1,0 +1,62 @@
+"""The figure of sensors.md, drawn from the project's own code: python docs/filters/sensors.py [FOLDER]."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from filters.particle_set import ParticleSet
+from filters.sensing import Range, RangeMeasurement
+
+BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
+STYLE = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e6e6",
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "svg.hashsalt": "beliefd",
+    "savefig.bbox": "tight",
+}
+RANGE_SIGMA = 0.5
+
+
+def outlier() -> Figure:
+    """Log likelihood of a range, with and without the outlier part, by the sensor model itself."""
+    innovation = np.linspace(-5.0, 5.0, 1001)
+    figure, axis = plt.subplots(figsize=(5.2, 3.2), layout="constrained")
+    lines = ((0.0, GREY, "Gaussian"), (0.05, BLUE, "5 % outliers"), (0.3, ORANGE, "30 % outliers"))
+    for outliers, colour, label in lines:
+        particles = ParticleSet(("north", "east", "heading"), innovation.size)
+        particles.count = innovation.size
+        particles.columns[0] = 20.0 - innovation
+        sensor = Range(RANGE_SIGMA, outliers=outliers)
+        constant = sensor.weigh(particles, 0, particles.count, RangeMeasurement(20.0, 0.0, 0.0))
+        axis.plot(innovation, constant + particles.log_weights, color=colour, label=label)
+    axis.set_ylim(-16, 0.5)
+    axis.set_xlabel("measured minus expected range, m (sigma 0.5 m)")
+    axis.set_ylabel("log likelihood, log(1/m)")
+    axis.legend(loc="lower center")
+    return figure
+
+
+def draw(folder: Path) -> None:
+    """Write the page's figure into a folder."""
+    with plt.rc_context(STYLE):
+        figure = outlier()
+        figure.savefig(folder / "sensors-outlier.svg", metadata={"Date": None})
+        plt.close(figure)
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
