@@ -79,16 +79,6 @@ class Layout:
         self.length = HEADER_LENGTH + self._struct.size
         self.columns = columns
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Layout) and self.described == other.described
-
-    __hash__ = None  # type: ignore[assignment]
-
-    @property
-    def described(self) -> tuple[object, ...]:
-        """What FMT says of it."""
-        return self.kind, self.name, self._struct.format, self.columns
-
     def stamp(self, data: Bytes, at: int) -> int | None:
         """Return the microseconds since boot of the message at ``at``, ``None`` where it bears none."""
         if self._stamp is None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+import uuid
 from pathlib import Path
 from typing import Any
 
+import can
 import cantools.database
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.can import CanFrame, CanSettings, FrameDecoder, SignalSettings, decoder_of
+from drivers.can import CanFrame, CanLink, CanSettings, FrameDecoder, SignalSettings, decoder_of
 from drivers.can.database import DbcError, read
 from drivers.can.dbc import DbcDecoder, group_of
 from drivers.can.decoder import Filter
@@ -284,3 +286,35 @@ def test_any_frames_give_plausible_samples_or_counts(dbc: str, sent: list[tuple[
         for sample in decoding.decode(CanFrame(identifier, data, extended, len(data) > 8), i * SECOND):
             assert sample.link == "bus"
     assert decoding.messages + decoding.ignored <= len(sent)
+
+
+def test_a_live_bus(dbc: str, oracle: Any) -> None:
+    """The same decoder behind python-can: a remote frame and a stranger are ignored."""
+    channel = f"dbc-{uuid.uuid4()}"
+    facts = CanSettings(
+        interface="virtual",
+        channel=channel,
+        protocol="dbc",
+        dbc=dbc,
+        signals=(signal("SPEED.SPEED", "speed"),),
+    )
+    link = CanLink("bus", facts)
+    link.open()
+    try:
+        with can.Bus(channel, "virtual") as sender:
+            sent = frame(oracle, "SPEED", SPEED=36.0)
+            sender.send(can.Message(arbitration_id=sent.identifier, data=sent.data, is_extended_id=False))
+            sender.send(can.Message(arbitration_id=5, is_extended_id=False))
+            sender.send(can.Message(arbitration_id=180, is_remote_frame=True, is_extended_id=False))
+            samples = [sample for _ in range(3) for sample in link.poll(1.0)]
+        assert [sample.reading for sample in samples] == [Speed(pytest.approx(10.0))]
+        report = link.report()
+        assert (report.messages, report.ignored, report.clock) == (1, 2, "arrival")
+    finally:
+        link.close()
+
+
+def test_a_link_without_its_file_is_refused(tmp_path: Path) -> None:
+    facts = CanSettings(protocol="dbc", dbc=str(tmp_path / "absent.dbc"), signals=(signal("A.B", "speed"),))
+    with pytest.raises(ValueError, match=r"absent\.dbc: cannot be read"):
+        CanLink("bus", facts)

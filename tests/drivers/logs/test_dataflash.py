@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
@@ -175,6 +176,29 @@ def test_the_other_sensors(path: Path) -> None:
     assert (origin.latitude, origin.altitude) == pytest.approx((math.radians(52.1712489), 12.5), abs=1e-12)
     assert isinstance(motor, MotorSpeed)
     assert (motor.index, motor.angular_speed) == (0, pytest.approx(math.tau))
+
+
+def test_two_range_finders_in_one_message_as_before_2019(path: Path) -> None:
+    layout = df.message(
+        "FMT", 145, 19, b"RFND", b"QCBBCBB", b"TimeUS,Dist1,Stat1,Orient1,Dist2,Stat2,Orient2"
+    )
+    log = b"\xa3\x95\x91" + struct.pack("<QHBBHBB", BASE, 250, 4, 25, 700, 3, 0)
+    samples, reader = read(path, df.definitions("FMT"), layout, log)
+    assert [s.reading for s in samples] == [Clearance(2.5, 25)]
+    assert reader.report().unusable == {"RFND.Dist2": 1}
+
+
+def test_what_says_that_it_is_sick_is_not_used(path: Path) -> None:
+    log = [
+        df.message("BARO", BASE, 0, 1.5, 98_765.0, 2_050, 0.0, 0),
+        df.message("IMU", BASE + 1, 0, 0.5, 0.5, 0.5, 0.0, 0.0, 1e4, 0, 0, 40.0, 1, 1, 0, 0),
+        df.message("IMU", BASE + 2, 0, 0.5, 0.5, 0.5, 0.0, 0.0, -9.5, 0, 0, 40.0, 1, 0, 0, 0),
+        df.message("MAG", BASE + 3, 0, 30_000, 0, 0, 1),
+    ]
+    samples, reader = read(path, df.definitions(), *log)
+    assert [s.reading for s in samples] == [Inertial((0.5, 0.5, 0.5))] * 2
+    assert reader.report().unusable == {"BARO.Health": 1, "IMU.AH": 1}
+    assert reader.report().malformed == {"IMU.Acc": 1, "MAG.Mag": 1}
 
 
 LABELS = {"k": b"deg/s", "m": b"m", "G": b"Gauss", "E": b"rad/s"}
