@@ -3,7 +3,8 @@
 Table 4.2, binary_Bayes_filter, section 4.2 of *Probabilistic Robotics*. The odds of a state are p / (1 - p)
 (eq. 4.12), their logarithm l runs from minus to plus infinity (4.13), and the belief comes back as
 1 - 1 / (1 + exp l) (4.14). The state being static, the belief depends on the measurements alone (4.11);
-Bayes' rule for the state and for its opposite (4.15 to 4.18), divided by each other (4.19), leaves a sum:
+Bayes' rule (4.15), turned round with the inverse model (4.16) for the state (4.17) and for its opposite (4.18),
+divided by each other (4.19), leaves a sum:
 
     l_t = l_{t-1} + log p(x | z_t) / (1 - p(x | z_t)) - log p(x) / (1 - p(x))          (4.20)
     l_0 = log p(x) / (1 - p(x))                                                        (4.21)

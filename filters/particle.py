@@ -1,4 +1,11 @@
-"""The particle filter of Table 4.3, over columns."""
+"""The particle filter of Table 4.3, over columns.
+
+Why its particles are samples of the belief, *Probabilistic Robotics*, 4.3.3: take each particle as the end of a
+whole path x_0..t (eq. 4.30). The belief about paths (4.31) factors by Bayes and Markov into the measurement's
+likelihood, the motion, and the belief about paths before (4.32). Line 4 draws from the last two, the proposal (4.29,
+4.33); so the weight, target over proposal (4.34), is the likelihood p(z_t | x_t) alone, and particles drawn by their
+weights are distributed as the belief (4.35). If they are never resampled, the weights multiply up (4.24).
+"""
 
 from __future__ import annotations
 
