@@ -39,7 +39,7 @@ STYLE = {
 
 def figure_4_5() -> Figure:
     """One particle set as each of the densities."""
-    shown = extraction(500)
+    shown = extraction(500, points=301)
     figure, axes = plt.subplots(2, 3, figsize=(8.6, 5.0), sharex=True, sharey=True, layout="constrained")
     titles = {
         "particles": "exact density",

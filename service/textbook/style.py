@@ -19,7 +19,7 @@ BLUE, RED, GREY, GREEN, ORANGE, PALE = "#2166ac", "#b2182b", "#666666", "#1b7837
 CHI_SQUARE_95 = 5.991
 """Squared radius of the ellipse that holds 95 % of a Gaussian of two dimensions."""
 
-_OUTLINE = re.compile(r' d="[^"]*"')
+_PLACES = re.compile(r' (?:d|x|y)="[^"]*"|translate\([^)]*\)')
 _LONG_NUMBER = re.compile(r"(\d\.\d\d)\d+")
 
 _STYLE: dict[str, Any] = {
@@ -96,8 +96,9 @@ def rug(axis: Axes, values: ArrayLike, ends: tuple[float, float], *, upright: bo
 
 
 def compact(picture: str) -> str:
-    """Round the outlines of an SVG to hundredths of a point: half the size, and nothing to see of it."""
-    return _OUTLINE.sub(lambda outline: _LONG_NUMBER.sub(r"\1", outline[0]), picture)
+    """Round an SVG's places to hundredths of a point and drop its indentation: smaller, and nothing to see of it."""
+    rounded = _PLACES.sub(lambda places: _LONG_NUMBER.sub(r"\1", places[0]), picture)
+    return re.sub(r"\n +", "\n", rounded)
 
 
 def save(figure: Figure, path: Path) -> None:

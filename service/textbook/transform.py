@@ -71,7 +71,7 @@ def samples() -> Exhibit:
 
 def densities() -> Exhibit:
     """Figure 4.5."""
-    found = extraction.extraction(points=601)
+    found = extraction.extraction(points=301)
     figure = sheet(9.6, 5.4)
     shown = panels(figure, 2, 3, sharex=True, sharey=True)
     titles = {
@@ -107,7 +107,7 @@ def chance() -> Exhibit:
     figure = sheet(9.6, 5.0)
     grid = figure.add_gridspec(2, 4, width_ratios=(1, 1, 1, 1.3))
     for row, count in enumerate(particles.COUNTS):
-        drawn = particles.draws(count)
+        drawn = particles.draws(count, points=201)
         for column, (points, density) in enumerate(zip(drawn.particles, drawn.densities, strict=True)):
             axis = figure.add_subplot(grid[row, column])
             axis.fill_between(drawn.y, transform.density(drawn.y), color=PALE, linewidth=0)

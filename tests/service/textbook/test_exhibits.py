@@ -51,9 +51,10 @@ def test_the_bytes_are_the_same_every_time(name: str, tmp_path: Path) -> None:
     assert "<dc:date>" not in first
 
 
-def test_outlines_are_rounded_and_nothing_else_is() -> None:
-    text = '<path d="M 1.23456 7 L -0.5 10.999999" transform="scale(0.123456)"/>'
-    assert style.compact(text) == '<path d="M 1.23 7 L -0.5 10.99" transform="scale(0.123456)"/>'
+def test_places_are_rounded_and_nothing_else_is() -> None:
+    text = '<path d="M 1.23456 7\n   L -0.5 10.999999" transform="translate(0.128 1) scale(0.123456)"/>'
+    expected = '<path d="M 1.23 7\nL -0.5 10.99" transform="translate(0.12 1) scale(0.123456)"/>'
+    assert style.compact(text) == expected
 
 
 def invoke(*arguments: str) -> tuple[int, str]:
