@@ -20,10 +20,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from service.replay.command import PARTICLES, show
+from service.replay.command import PARTICLES
 from service.replay.run import Plan, Run, replay
 from service.replay.seeds import summary
 from service.replay.site import setting_of
+from service.replay.table import show
 from service.score import read_truth
 
 SIMULATOR = (sys.executable, "-m", "sim_vehicle")

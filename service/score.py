@@ -109,18 +109,34 @@ class Score:
 UNSCORED = Score(None, None, None, None, None, None, None)
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """A track beside the truth at its own times, a row a tick; NaN where the truth is not known.
+
+    ``error`` is horizontal, metres; ``nees`` its normalised square (two on average).
+    """
+
+    error: NDArray[np.float64]
+    nees: NDArray[np.float64]
+
+
+def compare(track: Track, truth: Truth) -> Comparison:
+    """Return how far ``track`` is from ``truth``, tick by tick."""
+    north, east = truth.at(track.time)
+    dn, de = track.north - north, track.east - east
+    nn, ne, ee = track.covariance.T
+    determinant = np.maximum(nn * ee - ne**2, 1e-12)
+    nees: NDArray[np.float64] = (ee * dn**2 - 2 * ne * dn * de + nn * de**2) / determinant
+    return Comparison(np.hypot(dn, de), nees)
+
+
 def score(track: Track, truth: Truth) -> Score:
     """Compare ``track`` with ``truth`` at the track's own times."""
-    north, east = truth.at(track.time)
-    known = np.isfinite(north)
+    comparison = compare(track, truth)
+    known = np.isfinite(comparison.error)
     if not known.any():
         return UNSCORED
-    dn, de = (track.north - north)[known], (track.east - east)[known]
-    error: NDArray[np.float64] = np.hypot(dn, de)
-    nn, ne, ee = track.covariance[known].T
-    nees: NDArray[np.float64] = (ee * dn**2 - 2 * ne * dn * de + nn * de**2) / np.maximum(
-        nn * ee - ne**2, 1e-12
-    )
+    error, nees = comparison.error[known], comparison.nees[known]
     return Score(
         rmse_m=math.sqrt(float(np.mean(error**2))),
         mean_m=float(error.mean()),

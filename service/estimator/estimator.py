@@ -9,14 +9,15 @@ daemon's loop and a replay drive the very same object; only where ``now`` and ``
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.plausibility import implausible
 from drivers.sample import GeodeticPosition, LocalPosition, Origin, Sample
+from filters.belief import Belief
 from filters.kld import Demand
 from filters.particle import ParticleFilter
 from filters.policy import EffectiveShare, Policy, Wear
@@ -29,6 +30,7 @@ from service.estimator.binding import (
     Refusal,
     position_of,
 )
+from service.estimator.companion import Companion
 from service.estimator.controls import Controls
 from service.estimator.output import Output
 from service.estimator.records import SensorRecord, SensorRecords
@@ -73,6 +75,9 @@ START_COUNT = 10_000
 DEMAND_INTERVAL = SECOND // 5
 GROWTH = 1.25
 """The set grows between resamplings only if the demand is this much larger than the count."""
+
+
+C = TypeVar("C", bound=Companion)
 
 
 class Waiting(NamedTuple):
@@ -132,6 +137,13 @@ class Estimator:
         self._demand_time = -(2**62)
         self._sequence = 0
         self._thinning = False
+        self._companions: list[Companion] = []
+
+    def accompany(self, make: Callable[[Vehicle, Belief], C]) -> C:
+        """Have a companion told of every call on the belief from now on, and return it."""
+        companion = make(self._vehicle, self._filter)
+        self._companions.append(companion)
+        return companion
 
     # --- samples in ---------------------------------------------------------------------------------------------
 
@@ -247,6 +259,8 @@ class Estimator:
         while time > self._belief_time:
             step = min(time, self._belief_time + stride)
             self._vehicle.predict(self._filter, self._belief_time, step)
+            for companion in self._companions:
+                companion.moved(self._belief_time, step)
             self._belief_time = step
         self._stopwatch.lap("motion")
 
@@ -268,6 +282,8 @@ class Estimator:
             record.refused["invalid"] += 1
             return
         surprise = measured.surprise(evidence.log_mean)
+        for companion in self._companions:
+            companion.weighed(time, measured, evidence, surprise > OUTLIER)
         record.innovation = evidence.innovation
         record.last = time
         if surprise > OUTLIER:
@@ -359,6 +375,8 @@ class Estimator:
         self._filter.initialize(draw(self.configuration, self._filter.names, count, self.seed, anchor))
         self._vehicle.stand_at(anchor)
         self._belief_time = time
+        for companion in self._companions:
+            companion.started(time)
         self.health.restart()
 
     # --- estimates out ------------------------------------------------------------------------------------------

@@ -1,19 +1,16 @@
-"""The output predictor: the belief at the horizon, carried to now and put into the words of an Estimate."""
+"""What is published: the belief at the horizon, carried to now and put into the words of an Estimate."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from filters.belief import Displacement, Moments
-from filters.density.gaussian import radius
-from filters.motion.prediction import process_covariance, velocity_moments
+from filters.motion.prediction import velocity_moments
 from filters.motion.unicycle import UnicycleControl
 from filters.particle import ParticleFilter
 from service.estimate import Estimate, Triangle, Triple
+from service.estimator.carrier import Carrier, Pose
 from service.estimator.vehicle import Vehicle
 from service.geodesy import LocalFrame
 
@@ -21,55 +18,22 @@ UNKNOWN: Triple = (None, None, None)
 UNKNOWN_TRIANGLE: Triangle = (None, None, None, None, None, None)
 
 
-class Pose(NamedTuple):
-    """The belief at now: the particles' moments, carried; ``covariance`` of (north, east, heading)."""
-
-    moments: Moments
-    covariance: NDArray[np.float64]
-    speed: float
-    speed_variance: float
-    radius95: float
-
-    def mean(self, name: str) -> float:
-        """Return the mean of one column."""
-        return float(self.moments.mean[self.moments.names.index(name)])
-
-
 class Output:
-    """Carries moments from the belief's time to now and writes them down.
-
-    Attributes
-    ----------
-    displacement : Displacement or None
-        Of the last :meth:`at`; the cloud is carried by the same.
-    """
+    """Carries moments from the belief's time to now and writes them down."""
 
     def __init__(self, vehicle: Vehicle, belief: ParticleFilter[UnicycleControl]) -> None:
         self._vehicle = vehicle
         self._belief = belief
-        self._biases = (0.0, 1.0)
-        self.displacement: Displacement | None = None
+        self._carrier = Carrier(vehicle, belief)
+
+    @property
+    def displacement(self) -> Displacement | None:
+        """Of the last :meth:`at`; the cloud is carried by the same."""
+        return self._carrier.displacement
 
     def at(self, belief_time: int, now: int) -> Pose:
         """Return the belief carried from ``belief_time`` to ``now`` (nanoseconds)."""
-        displacement = self._vehicle.displacement(belief_time, now, self._biases)
-        moments = self._belief.moments(displacement)
-        index = moments.names.index
-        self._biases = (
-            float(moments.mean[index("gyro_bias")]),
-            float(moments.mean[index("odometry_scale")]),
-        )
-        distance = math.hypot(displacement.forward, displacement.right)
-        heading = float(moments.mean[index("heading")])
-        noise = self._vehicle.noise(belief_time, now)
-        covariance = moments.pose_covariance + process_covariance(
-            distance, heading - 0.5 * displacement.turn, noise
-        )
-        self.displacement = displacement
-        speed = self._vehicle.controls.speed(now) * self._biases[1]
-        return Pose(
-            moments, covariance, speed, self._vehicle.speed_variance(now), radius(covariance[:2, :2], 0.95)
-        )
+        return self._carrier.at(belief_time, now)
 
     def estimate(self, pose: Pose | None, frame: LocalFrame | None, **figures: Any) -> Estimate:
         """Write ``pose`` down; ``figures`` are the fields of :class:`Estimate` that the belief does not know."""

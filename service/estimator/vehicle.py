@@ -87,11 +87,12 @@ class Vehicle:
     def predict(self, belief: ParticleFilter[UnicycleControl], start: int, end: int) -> None:
         """Move the particles by what the controls say of ``start`` to ``end`` (nanoseconds)."""
         duration = (end - start) / SECOND
-        belief.predict(self._control(start, end), duration)
+        belief.predict(self.control(start, end), duration)
         if self._height is not None:
             self._height.predict(np.eye(1), np.array([[CLIMB**2 * duration]]))
 
-    def _control(self, start: int, end: int) -> UnicycleControl:
+    def control(self, start: int, end: int) -> UnicycleControl:
+        """Return what odometer and gyro say of ``start`` to ``end``, with what is unknown of it as a sigma."""
         distance, turn = self.controls.distance(start, end), self.controls.turn(start, end)
         return UnicycleControl(
             distance.total,
@@ -117,7 +118,7 @@ class Vehicle:
 
     def noise(self, start: int, end: int) -> IntervalNoise:
         """Return the process noise of an interval, as the motion model has it."""
-        return IntervalNoise(*self.motion.noise_variances(self._control(start, end), (end - start) / SECOND))
+        return IntervalNoise(*self.motion.noise_variances(self.control(start, end), (end - start) / SECOND))
 
     def speed_variance(self, time: int) -> float:
         """Return the variance of the speed that is published for ``time``, (m/s)².

@@ -7,30 +7,31 @@ estimates are the ones that the daemon would have published, had it been there w
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
 import msgspec
-import numpy as np
 
 from drivers.logs import LogReader
 from drivers.sample import LinkReport, Sample
 from service.config import Configuration
-from service.estimate import Estimate, HealthState
 from service.estimator import Estimator
+from service.estimator.shadow import Shadow
 from service.replay.rows import EstimateFile
 from service.replay.sources import LogError, merged, open_log
-from service.score import UNSCORED, Score, Track, Truth, score
+from service.replay.tally import ShadowRun, ShadowTally, Tally
+from service.replay.trace import Trace, Tracer
+from service.score import Score, Truth
 
 SECOND = 1_000_000_000
 SILENCE_LIMIT = 600 * SECOND
 """A log with a hole longer than this was spliced; ticks are not made up through it."""
 
-Progress = Callable[[float], None]
+Progress = Callable[[float, float], None]
+"""Called with the share of the log that is done, and how many seconds of it that was."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class Plan:
         How many particles every tick affords; a replay has no deadline, so this stands for the machine.
     out : Path or None
         Folder for ``estimates_seedN.csv``.
+    traced : int or None
+        The seed whose run is written down tick by tick, for a report.
     """
 
     logs: tuple[Path, ...]
@@ -52,11 +55,20 @@ class Plan:
     particles: int
     truth: Truth | None = None
     out: Path | None = None
+    traced: int | None = None
 
 
 @dataclass
 class Run:
-    """What one seed gave; :meth:`row` is its object in ``--json``."""
+    """What one seed gave; :meth:`row` is its object in ``--json``.
+
+    Attributes
+    ----------
+    shadow : ShadowRun
+        What the extended Kalman filter made of the same samples.
+    trace : Trace or None
+        The run tick by tick, where the plan asked for it.
+    """
 
     seed: int
     score: Score
@@ -70,7 +82,9 @@ class Run:
     biases: dict[str, tuple[float, float]]
     sensors: dict[str, tuple[int, dict[str, int]]]
     links: list[LinkReport]
+    shadow: ShadowRun
     last_reason: str = ""
+    trace: Trace | None = None
 
     def row(self) -> dict[str, object]:
         """Return the figures as ``--json`` prints them."""
@@ -89,45 +103,9 @@ class Run:
                 name: {"accepted": accepted, "refused": refused}
                 for name, (accepted, refused) in self.sensors.items()
             },
+            "shadow": self.shadow.row(),
             "links": [msgspec.to_builtins(report) for report in self.links],
         }
-
-
-@dataclass
-class _Tally:
-    """Collects what a run's summary needs, tick by tick."""
-
-    time: list[float] = field(default_factory=list[float])
-    north: list[float] = field(default_factory=list[float])
-    east: list[float] = field(default_factory=list[float])
-    covariance: list[tuple[float, float, float]] = field(default_factory=list[tuple[float, float, float]])
-    health: Counter[HealthState] = field(default_factory=Counter[HealthState])
-    particles: int = 0
-    last: Estimate | None = None
-
-    def add(self, estimate: Estimate) -> None:
-        self.last = estimate
-        self.health[estimate.health] += 1
-        self.particles += estimate.particles
-        north, east, _ = estimate.position
-        nn, ne, _, ee, _, _ = estimate.position_covariance
-        if north is not None and east is not None and None not in (nn, ne, ee):
-            self.time.append(estimate.time)
-            self.north.append(north)
-            self.east.append(east)
-            self.covariance.append((nn or 0.0, ne or 0.0, ee or 0.0))
-
-    @property
-    def ticks(self) -> int:
-        return sum(self.health.values())
-
-    def track(self) -> Track:
-        return Track(
-            np.asarray(self.time),
-            np.asarray(self.north),
-            np.asarray(self.east),
-            np.asarray(self.covariance, np.float64).reshape(-1, 3),
-        )
 
 
 def ticks_of(samples: Iterator[Sample], rate: float) -> Iterator[tuple[int, list[Sample]]]:
@@ -149,7 +127,7 @@ def ticks_of(samples: Iterator[Sample], rate: float) -> Iterator[tuple[int, list
     yield deadline, batch
 
 
-def replay(plan: Plan, seed: int, progress: Progress = lambda share: None) -> Run:
+def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: None) -> Run:
     """Replay ``plan`` once with ``seed``.
 
     Raises
@@ -160,11 +138,13 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share: None) -> Ru
     readers = [open_log(path, plan.configuration) for path in plan.logs]
     began = time.perf_counter()
     estimator = Estimator(plan.configuration, seed=seed)
+    beside = ShadowTally(estimator.accompany(Shadow))
+    tracer = estimator.accompany(lambda vehicle, belief: Tracer()) if plan.traced == seed else None
     samples = merged(readers)
     first = next(samples, None)
     if first is None:
         raise LogError(nothing_in(readers, plan.logs))
-    tally = _Tally()
+    tally = Tally()
     with ExitStack() as stack:
         file = None
         if plan.out is not None:
@@ -174,20 +154,26 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share: None) -> Ru
             estimator.ingest(batch)
             estimate = estimator.tick(now, now, plan.particles)
             tally.add(estimate)
+            shadow = beside.add(now, estimate.time)
+            if tracer is not None:
+                tracer.add(estimate, shadow)
             if file is not None:
                 file.write(estimate, now)
             if tally.ticks % 256 == 0:
-                progress(_share(readers))
+                progress(_share(readers), tally.ticks / plan.configuration.loop.rate)
     seconds = time.perf_counter() - began
-    progress(1.0)
-    return _run(seed, plan, estimator, tally, readers, seconds, now)
+    progress(1.0, tally.ticks / plan.configuration.loop.rate)
+    run = _run(seed, plan, estimator, tally, beside, readers, seconds, now)
+    run.trace = None if tracer is None else tracer.trace()
+    return run
 
 
 def _run(
     seed: int,
     plan: Plan,
     estimator: Estimator,
-    tally: _Tally,
+    tally: Tally,
+    beside: ShadowTally,
     readers: list[LogReader],
     seconds: float,
     now: int,
@@ -197,7 +183,7 @@ def _run(
     last = tally.last
     return Run(
         seed=seed,
-        score=score(tally.track(), plan.truth) if plan.truth is not None else UNSCORED,
+        score=tally.path.score(plan.truth),
         particles_mean=tally.particles / max(1, tally.ticks),
         late_samples=late,
         dropped=sum(drops.values()),
@@ -208,6 +194,7 @@ def _run(
         biases=dict(last.biases) if last else {},
         sensors={s.name: (s.accepted, s.refused) for s in estimator.sensors(now)},
         links=[reader.report() for reader in readers],
+        shadow=beside.run(plan.truth),
         last_reason=last.reason if last else "",
     )
 

@@ -11,22 +11,23 @@ from multiprocessing.queues import SimpleQueue
 
 from service.replay.run import Plan, Run, replay
 
-Report = Callable[[int, float], None]
-"""Called with a seed and the share of its log that is done."""
+Report = Callable[[int, float, float], None]
+"""Called with a seed, the share of its log that is done, and how many seconds of the log that was."""
 
-_progress: SimpleQueue[tuple[int, float]] | None = None
+Step = tuple[int, float, float]
+_progress: SimpleQueue[Step] | None = None
 
 
-def _begin(queue: SimpleQueue[tuple[int, float]]) -> None:
+def _begin(queue: SimpleQueue[Step]) -> None:
     global _progress  # noqa: PLW0603  a pool hands its workers nothing else
     _progress = queue
 
 
 def _work(plan: Plan, seed: int) -> Run:
     queue = _progress
-    return replay(
-        plan, seed, (lambda share: None) if queue is None else lambda share: queue.put((seed, share))
-    )
+    if queue is None:
+        return replay(plan, seed)
+    return replay(plan, seed, lambda share, seconds: queue.put((seed, share, seconds)))
 
 
 def replay_seeds(plan: Plan, seeds: list[int], report: Report, processes: int | None = None) -> list[Run]:
@@ -35,9 +36,9 @@ def replay_seeds(plan: Plan, seeds: list[int], report: Report, processes: int | 
     One seed runs here; several run in a pool of ``processes`` (default: one per processor).
     """
     if len(seeds) == 1:
-        return [replay(plan, seeds[0], lambda share: report(seeds[0], share))]
+        return [replay(plan, seeds[0], lambda share, seconds: report(seeds[0], share, seconds))]
     context = multiprocessing.get_context("spawn")
-    queue: SimpleQueue[tuple[int, float]] = context.SimpleQueue()
+    queue: SimpleQueue[Step] = context.SimpleQueue()
     workers = min(len(seeds), processes or os.cpu_count() or 1)
     with ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(queue,)) as pool:
         futures = {pool.submit(_work, plan, seed): seed for seed in seeds}
@@ -48,26 +49,38 @@ def replay_seeds(plan: Plan, seeds: list[int], report: Report, processes: int | 
                 report(*queue.get())
             for future in done:
                 future.result()
-                report(futures[future], 1.0)
+        while not queue.empty():
+            report(*queue.get())
         return [future.result() for future in sorted(futures, key=lambda f: futures[f])]
 
 
-SUMMARISED = ("rmse_m", "mean_m", "p95_m", "max_m", "coverage_95", "nees_mean", "final_m", "particles_mean")
+SCORES = ("rmse_m", "mean_m", "p95_m", "max_m", "coverage_95", "nees_mean", "final_m")
+SUMMARISED = (*SCORES, "particles_mean", "real_time_factor")
 
 
 def summary(runs: list[Run]) -> dict[str, object]:
-    """Return mean, standard deviation, least and greatest over the seeds of every figure, and the health shares."""
-    rows = [run.row() for run in runs]
+    """Return mean, standard deviation, least and greatest over the seeds of every figure, and the health shares.
+
+    ``shadow`` holds the same of the extended Kalman filter, and how many innovations its gate kept out.
+    """
     spread: dict[str, object] = {"seeds": len(runs)}
-    for name in SUMMARISED:
+    spread |= _spreads([run.row() for run in runs], SUMMARISED)
+    states = sorted({state for run in runs for state in run.health})
+    spread["health"] = {s: round(statistics.fmean(run.health.get(s, 0.0) for run in runs), 4) for s in states}
+    shadows = [run.shadow.row() | {"gated": sum(run.shadow.gated.values())} for run in runs]
+    spread["shadow"] = _spreads(shadows, (*SCORES, "gated", "ticks"))
+    return spread
+
+
+def _spreads(rows: list[dict[str, object]], names: tuple[str, ...]) -> dict[str, object]:
+    spreads: dict[str, object] = {}
+    for name in names:
         values = [float(value) for row in rows if isinstance(value := row[name], int | float)]
         if values:
-            spread[name] = {
+            spreads[name] = {
                 "mean": round(statistics.fmean(values), 4),
                 "sd": round(statistics.stdev(values), 4) if len(values) > 1 else 0.0,
                 "min": round(min(values), 4),
                 "max": round(max(values), 4),
             }
-    states = sorted({state for run in runs for state in run.health})
-    spread["health"] = {s: round(statistics.fmean(run.health.get(s, 0.0) for run in runs), 4) for s in states}
-    return spread
+    return spreads

@@ -99,7 +99,7 @@ def test_seeds_run_side_by_side_and_keep_their_order(drive: Path) -> None:
     assert setting.truth is not None
     plan = Plan(logs_of(drive), setting.configuration, 500, read_truth(setting.truth))
     shares: dict[int, float] = {}
-    runs = replay_seeds(plan, [0, 1], lambda seed, share: shares.update({seed: share}), processes=2)
+    runs = replay_seeds(plan, [0, 1], lambda seed, share, _: shares.update({seed: share}), processes=2)
     assert [run.seed for run in runs] == [0, 1]
     assert shares == {0: 1.0, 1: 1.0}
     assert runs[0].score.rmse_m != runs[1].score.rmse_m

@@ -1,0 +1,104 @@
+"""A replay's runs as a table: a row a seed, the spread over the seeds, and the shadow Kalman filter below."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from service.replay.bars import speed_in_words
+from service.replay.run import Run, counts
+from service.replay.seeds import summary
+
+FIGURES = (
+    ("rmse_m", "RMSE m", "{:.3f}"),
+    ("p95_m", "95 % m", "{:.3f}"),
+    ("max_m", "worst m", "{:.3f}"),
+    ("coverage_95", "in 95 %", "{:.1%}"),
+    ("nees_mean", "NEES", "{:.2f}"),
+    ("final_m", "end m", "{:.3f}"),
+    ("particles_mean", "count", "{:.0f}"),
+)
+SHADOW = "EKF"
+"""What the extended Kalman filter's rows are called."""
+
+
+def show(runs: list[Run], console: Console, title: str) -> None:
+    """Print a table of the runs, what became of the samples, and the spread over the seeds."""
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1))
+    table.add_column("seed", justify="right")
+    for _, heading, _ in FIGURES:
+        table.add_column(heading, justify="right")
+    table.add_column("speed", justify="right")
+    for run in runs:
+        table.add_row(str(run.seed), *_cells(run.row()), f"x{run.real_time_factor:.0f}")
+    spread: dict[str, Any] = summary(runs)
+    statistics = ("mean", "sd", "max") if len(runs) > 1 else ()
+    if statistics:
+        table.add_section()
+    for statistic in statistics:
+        table.add_row(statistic, *_cells(_column(spread, statistic)), "")
+    table.add_section()
+    for statistic in statistics or ("mean",):
+        name = SHADOW if len(runs) == 1 else f"{SHADOW} {statistic}"
+        table.add_row(name, *_cells(_column(spread["shadow"], statistic)), "", style="dim")
+    console.print(table)
+    health: dict[str, float] = spread["health"]
+    shares = ", ".join(f"{state} {share:.1%}" for state, share in health.items())
+    console.print(f"  health: {shares}", highlight=False)
+    slowest = min(run.real_time_factor for run in runs)
+    console.print(f"  the slowest run: {speed_in_words(slowest)}", highlight=False)
+    _show_details(runs[0], console)
+    _show_shadow(runs[0], console)
+
+
+def figure(value: Any, form: str) -> str:
+    """Return a figure in its form, and a dash where there is none."""
+    return "–" if value is None else form.format(value)
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    return [figure(row.get(name), form) for name, _, form in FIGURES]
+
+
+def _column(spread: dict[str, Any], statistic: str) -> dict[str, Any]:
+    return {name: spread.get(name, {}).get(statistic) for name, _, _ in FIGURES}
+
+
+def _show_details(run: Run, console: Console) -> None:
+    for name, (value, sigma) in run.biases.items():
+        console.print(f"  {name} at the end: {value:.5f} ± {sigma:.5f}", highlight=False)
+    for name, (accepted, refused) in run.sensors.items():
+        console.print(
+            f"  {name}: {accepted} used" + (f"; refused: {counts(refused)}" if refused else ""),
+            highlight=False,
+        )
+    for link in run.links:
+        console.print(
+            f'  link "{link.link}": {link.messages} messages, {link.samples} samples'
+            + (f"; lost on the way: {link.lost}" if link.lost else "")
+            + (f"; malformed: {counts(link.malformed)}" if link.malformed else "")
+            + (f"; not usable: {counts(link.unusable)}" if link.unusable else ""),
+            highlight=False,
+        )
+    if run.score.rmse_m is None:
+        console.print("  no truth to compare with (--truth CSV)", highlight=False)
+    if run.last_reason:
+        console.print(f"  at the end: {run.last_reason}", highlight=False)
+
+
+def _show_shadow(run: Run, console: Console) -> None:
+    """Say what the extended Kalman filter left out, in one line."""
+    shadow = run.shadow
+    if not shadow.ticks:
+        said = "never began: the heading was never known well enough"
+    else:
+        gated = f"gated: {counts(shadow.gated)}" if shadow.gated else "nothing gated"
+        said = f"{sum(shadow.accepted.values())} used; {gated}"
+    if shadow.unsupported:
+        said += f"; it has no model for {counts(shadow.unsupported)}"
+    if shadow.failure:
+        said += f"; it stopped: {shadow.failure}"
+    console.print(f"  {SHADOW} (extended Kalman filter, same samples): {said}", highlight=False)

@@ -1,0 +1,129 @@
+"""What a run's summary needs, collected tick by tick: of the particle filter, and of the shadow beside it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from service.estimate import Estimate, HealthState
+from service.estimator.carrier import Pose
+from service.estimator.shadow import Shadow
+from service.score import UNSCORED, Score, Track, Truth, score
+
+
+@dataclass
+class Path2D:
+    """A track under construction: one row a tick that had a position."""
+
+    time: list[float] = field(default_factory=list[float])
+    north: list[float] = field(default_factory=list[float])
+    east: list[float] = field(default_factory=list[float])
+    covariance: list[tuple[float, float, float]] = field(default_factory=list[tuple[float, float, float]])
+
+    def add(self, time: float, north: float, east: float, covariance: tuple[float, float, float]) -> None:
+        """Append one tick; ``covariance``: nn, ne, ee."""
+        self.time.append(time)
+        self.north.append(north)
+        self.east.append(east)
+        self.covariance.append(covariance)
+
+    def track(self) -> Track:
+        """Return what was added, as arrays."""
+        return Track(
+            np.asarray(self.time, np.float64),
+            np.asarray(self.north, np.float64),
+            np.asarray(self.east, np.float64),
+            np.asarray(self.covariance, np.float64).reshape(-1, 3),
+        )
+
+    def score(self, truth: Truth | None) -> Score:
+        """Compare with ``truth``, if there is one and there was a position."""
+        return UNSCORED if truth is None or not self.time else score(self.track(), truth)
+
+
+@dataclass
+class Tally:
+    """The estimates of a run, counted."""
+
+    path: Path2D = field(default_factory=Path2D)
+    health: Counter[HealthState] = field(default_factory=Counter[HealthState])
+    particles: int = 0
+    last: Estimate | None = None
+
+    def add(self, estimate: Estimate) -> None:
+        """Count one tick."""
+        self.last = estimate
+        self.health[estimate.health] += 1
+        self.particles += estimate.particles
+        north, east, _ = estimate.position
+        nn, ne, _, ee, _, _ = estimate.position_covariance
+        if north is not None and east is not None and None not in (nn, ne, ee):
+            self.path.add(estimate.time, north, east, (nn or 0.0, ne or 0.0, ee or 0.0))
+
+    @property
+    def ticks(self) -> int:
+        """How many there were."""
+        return sum(self.health.values())
+
+
+@dataclass(frozen=True)
+class ShadowRun:
+    """What the shadow Kalman filter gave beside a run; :meth:`row` is its object in ``--json``.
+
+    Attributes
+    ----------
+    ticks : int
+        In how many it had a position: it begins once the heading is known.
+    accepted, gated, unsupported : dict[str, int]
+        Measurements by sensor: weighed in; kept out by the gate; of a model that it has no derivative of.
+    failure : str
+        Why it stopped before the end, if it did.
+    """
+
+    score: Score
+    ticks: int
+    accepted: dict[str, int]
+    gated: dict[str, int]
+    unsupported: dict[str, int]
+    failure: str
+
+    def row(self) -> dict[str, object]:
+        """Return the figures as ``--json`` prints them."""
+        return {
+            **self.score.rounded(),
+            "ticks": self.ticks,
+            "accepted": self.accepted,
+            "gated": self.gated,
+            "unsupported": self.unsupported,
+            "failure": self.failure,
+        }
+
+
+class ShadowTally:
+    """The shadow's poses of a run, with what became of its measurements."""
+
+    def __init__(self, shadow: Shadow) -> None:
+        self.path = Path2D()
+        self._shadow = shadow
+
+    def add(self, now: int, time: float) -> Pose | None:
+        """Ask the shadow where it is at ``now`` (nanoseconds; ``time``: the same as Unix seconds), and return it."""
+        pose = self._shadow.at(now)
+        if pose is not None:
+            nn, ne, ee = (float(pose.covariance[i, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
+            self.path.add(time, pose.mean("north"), pose.mean("east"), (nn, ne, ee))
+        return pose
+
+    def run(self, truth: Truth | None) -> ShadowRun:
+        """Return the figures."""
+        shadow = self._shadow
+        return ShadowRun(
+            self.path.score(truth),
+            len(self.path.time),
+            dict(sorted(shadow.accepted.items())),
+            dict(sorted(shadow.gated.items())),
+            dict(sorted(shadow.unsupported.items())),
+            shadow.failure,
+        )
