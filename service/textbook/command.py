@@ -57,7 +57,7 @@ def _print(console: Console, name: str, tables: Sequence[Table], path: Path) -> 
     for told in tables:
         table = RichTable(title=told.title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1))
         for place, column in enumerate(told.columns):
-            table.add_column(column, justify="left" if place == 0 else "right")
+            table.add_column(column, justify="left" if place == 0 else "right", no_wrap=place == 0)
         for row in told.rows:
             table.add_row(*row)
         console.print(table, markup=False)
