@@ -13,11 +13,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from service.estimate import StageCost
+from service.estimate import Distribution, StageCost
 
-STAGES = ("ingest", "motion", "sensing", "resampling", "extraction", "publishing")
+STAGES = ("ingest", "motion", "sensing", "resampling", "extraction", "publishing", "cloud")
 TICK = "tick"
 _MILLISECONDS = 1e3
+_SHARES = {"median": 0.5, "p99": 0.99, "p999": 0.999, "p9999": 0.9999}
 
 
 class Ring:
@@ -89,7 +90,24 @@ class Histogram:
             return 0.0
         rank = max(1, math.ceil(probability * total))
         index = int(np.searchsorted(np.cumsum(self._counts), rank))
-        return min(self.LOWEST * 2.0 ** ((index + 1) / self.PER_OCTAVE), self.worst)
+        return min(self._edge(index), self.worst)
+
+    def distribution(self) -> Distribution:
+        """Return the histogram as it is published: percentiles, and the bins that hold anything."""
+        held = np.flatnonzero(self._counts)
+        return Distribution(
+            ticks=self.total,
+            **{name: _MILLISECONDS * self.quantile(share) for name, share in _SHARES.items()},
+            worst=_MILLISECONDS * self.worst,
+            bins=[
+                (round(_MILLISECONDS * self._edge(index), 6), int(self._counts[index]))
+                for index in held.tolist()
+            ],
+        )
+
+    def _edge(self, index: int) -> float:
+        """Return the upper edge of a bin, seconds."""
+        return self.LOWEST * 2.0 ** ((index + 1) / self.PER_OCTAVE)
 
 
 class Meters:
@@ -133,6 +151,11 @@ class Meters:
         self.costs[stage] = self.costs.get(stage, 0.0) + (now - self._lapped) * 1e-9
         self._lapped = now
 
+    @property
+    def spent(self) -> float:
+        """Seconds of processor time since the tick under way began."""
+        return (self._processor_ns() - self._began) * 1e-9
+
     def end(self, lateness: float, duration: float) -> float:
         """Close a tick, and return what it cost in all, seconds of processor time.
 
@@ -143,7 +166,7 @@ class Meters:
         duration : float
             Seconds of wall time from its start to its end.
         """
-        cost = (self._processor_ns() - self._began) * 1e-9
+        cost = self.spent
         for stage, seconds in self.costs.items():
             if stage not in self._rings:
                 self._rings[stage] = Ring(self._capacity)

@@ -68,6 +68,8 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
         Steps once when the position jumps for another reason than motion.
     biases : dict[str, tuple[float, float]]
         Slow states: name to value and sigma.
+    level_reason : str
+        What this tick gave up, and for what; empty at level 0.
     """
 
     sequence: int
@@ -93,6 +95,7 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
     effective_sample_size: float | None
     reset_counter: int
     biases: dict[str, tuple[float, float]]
+    level_reason: str = ""
 
 
 class Health(msgspec.Struct, frozen=True, gc=False):
@@ -132,6 +135,29 @@ class StageCost(msgspec.Struct, frozen=True, gc=False):
     worst: float
 
 
+class Distribution(msgspec.Struct, frozen=True, gc=False):
+    """A time in every tick of the whole run, in bins of equal ratio, ten to the octave; milliseconds.
+
+    Attributes
+    ----------
+    ticks : int
+        How many values there are.
+    median, p99, p999, p9999, worst : float
+        Half of the values, 99 %, 99.9 % and 99.99 % are no more than this; the upper edge of a bin, so at most
+        7 % too high. ``worst`` is exact.
+    bins : list[tuple[float, int]]
+        Upper edge and count of each bin that holds anything.
+    """
+
+    ticks: int
+    median: float
+    p99: float
+    p999: float
+    p9999: float
+    worst: float
+    bins: list[tuple[float, int]]
+
+
 class Budget(msgspec.Struct, frozen=True, gc=False):
     """Once a second: what the loop spent and what it gave up.
 
@@ -142,8 +168,8 @@ class Budget(msgspec.Struct, frozen=True, gc=False):
     budget_ms, rate : float
         What the configuration grants per tick, and ticks per second.
     stages : dict[str, StageCost]
-        ``ingest``, ``motion``, ``sensing``, ``resampling``, ``extraction``, ``publishing`` and ``tick``
-        (all of it).
+        ``ingest``, ``motion``, ``sensing``, ``resampling``, ``extraction``, ``publishing``, ``cloud`` and
+        ``tick`` (all of it).
     use : float
         Share of the budget used, median over the ticks.
     demanded, afforded, particles, level : int
@@ -158,6 +184,18 @@ class Budget(msgspec.Struct, frozen=True, gc=False):
     drops : dict[str, int]
         Since the start: what was dropped, by what (``link autopilot``, ``publisher``, ``late``, ``future``
         …).
+    rested_ticks : int
+        Since the start: ticks left out on purpose, to pay for ticks far over the budget.
+    cut_ticks : int
+        Since the start: ticks whose weighing was ended because the rest of it would have overrun.
+    levels : dict[str, int]
+        Since the start: ticks at each level.
+    level_reason : str
+        As in :class:`Estimate`, of the last tick.
+    run_lateness, run_duration : Distribution or None
+        From deadline to start, and from start to end, of every tick since the start; wall time.
+    page_faults : int
+        Minor and major page faults of the loop's process over the last second; none once it has settled.
     """
 
     time: float
@@ -175,6 +213,13 @@ class Budget(msgspec.Struct, frozen=True, gc=False):
     lateness: StageCost
     queues: dict[str, int]
     drops: dict[str, int]
+    rested_ticks: int = 0
+    cut_ticks: int = 0
+    levels: dict[str, int] = {}
+    level_reason: str = ""
+    run_lateness: Distribution | None = None
+    run_duration: Distribution | None = None
+    page_faults: int = 0
 
 
 class SensorStatus(msgspec.Struct, frozen=True, gc=False):

@@ -19,17 +19,26 @@ shape only makes the way to the right count longer.
 The count does not hunt: it shrinks at once when the supply falls below it, and grows by at most a tenth per
 tick, only while the supply is clearly above it, and never quite up to it.
 
+When not even the least count fits, the work is thinned in the declared order: fewer measurements, as many as the
+budget pays for one by one; then no cloud; then prediction only, where every measurement is dropped. Down goes at
+once, up only after :data:`CALM` ticks that would have had room. What is not done is not measured either: with
+prediction only, the remembered cost of a measurement fades until one is tried again.
+
 What a cost is measured in is the caller's choice; the loop uses the processor time of its process, because
 the budget is a share of the processor: a tick that was preempted by somebody else has not cost more, and
-threads that help have. Being preempted shows in the lateness, which is wall time. No clock in here.
+threads that help have. But a tick whose work does not fit into what others leave of its period makes the next
+one late. So the running high quantile of what ticks *waited* (wall time less processor time) is taken off the
+period, and where less than the budget remains, that is what is spent. No clock in here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
+from math import inf
+from typing import NamedTuple
 
+from service.estimator.course import CROWD, Cause, Level
 from service.quantile import RunningQuantile
 
 PROBABILITY = 0.95
@@ -38,16 +47,26 @@ GROWTH = 1.1
 HEADROOM = 0.9
 """Growth stops at this share of the supply; between it and the supply the count stays as it is."""
 
+SETTLE = 32
+"""Ticks after a shrinking in which the count does not grow: it turns no more often than that."""
+
+CALM = 64
+"""Ticks in a row that must have room for a lower level before it is taken."""
+
+FADING = 0.98
+"""What the cost of work that is not done is multiplied with in every tick, until it is tried again."""
+
+PERIOD_SHARE = 0.9
+"""Of the period, what ticks may last, waiting included."""
+
+PER_MEASUREMENT = ("motion", "sensing", "resampling")
+"""Stages whose cost grows with the number of measurements, too."""
+
+CLOUD = "cloud"
+"""The stage that level 3 leaves out."""
 
 COLD = 2.0
 """Scale before the first tick: between ticks the caches belong to others, in the rehearsal they did not."""
-
-
-class Level(IntEnum):
-    """How far a tick was degraded, in the declared order; the loop's governor decides the first two."""
-
-    FULL = 0
-    FEWER_PARTICLES = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +97,28 @@ class Decision:
         Particles that the budget pays for, up to the configured maximum. Under the minimum the vehicle is
         starved: the count stays at the minimum, and every tick costs more than its budget.
     level : Level
-        ``FEWER_PARTICLES`` when ``count`` is less than what was demanded.
+        ``FEWER_PARTICLES`` when ``count`` is less than what was demanded; more when not even the least fits.
+    cause : Cause
+        Whether the budget is what is short, or what others leave of the processor.
+    most : int
+        How many measurements may be weighed.
     """
 
     count: int
     afforded: int
     level: Level
+    cause: Cause
+    most: int
+
+
+class Rung(NamedTuple):
+    """How much of a tick's work is left, beside the particles."""
+
+    level: Level
+    most: int
+
+
+WHOLE = Rung(Level.FULL, CROWD)
 
 
 class Governor:
@@ -97,6 +132,8 @@ class Governor:
         Bounds of the count, whatever the budget says.
     shapes : Mapping[str, Shape]
         Of the stages that work on particles, as far as they were measured.
+    period : float
+        Seconds from tick to tick.
 
     Raises
     ------
@@ -104,17 +141,25 @@ class Governor:
         The budget is not positive, or the bounds are not in order.
     """
 
-    def __init__(self, budget: float, smallest: int, largest: int, shapes: Mapping[str, Shape]) -> None:
+    def __init__(
+        self, budget: float, smallest: int, largest: int, shapes: Mapping[str, Shape], period: float = inf
+    ) -> None:
         if budget <= 0.0:
             raise ValueError(f"the budget must be more than 0 seconds per tick, got {budget}")
         if not 1 <= smallest <= largest:
             raise ValueError(f"particles need 1 <= smallest <= largest, got {smallest} and {largest}")
         self._budget = budget
+        self._period = period
         self._smallest = smallest
         self._largest = largest
         self._shapes = dict(shapes)
         self._scales = {stage: _expecting(COLD) for stage in shapes}
         self._fixed: dict[str, RunningQuantile] = {}
+        self._each = RunningQuantile(WINDOW, PROBABILITY)
+        self._waits = _expecting(0.0)
+        self._rung = WHOLE
+        self._calm = 0
+        self._since_shrinking = SETTLE
         self._limit = self._clamped(self.supply)
 
     def observe(self, stage: str, seconds: float, count: int) -> None:
@@ -139,6 +184,16 @@ class Governor:
             self._scales[stage] = RunningQuantile(WINDOW, PROBABILITY)
         self._scales[stage].add(seconds / self._shapes[stage].at(count))
 
+    def observe_measurement(self, seconds: float, count: int) -> None:
+        """Learn what one measurement cost in a tick with ``count`` particles, moving and resampling included."""
+        shape = self._work_at(count)
+        if shape > 0.0:
+            self._each.add(seconds / shape)
+
+    def observe_wait(self, seconds: float) -> None:
+        """Learn for how long a tick did not have the processor, from its deadline to its end."""
+        self._waits.add(max(0.0, seconds))
+
     @property
     def fixed(self) -> float:
         """Seconds per tick that do not depend on the count."""
@@ -151,22 +206,90 @@ class Governor:
         return sum(self._shapes[stage].per_particle * scale.value for stage, scale in self._scales.items())
 
     @property
+    def room(self) -> float:
+        """Seconds that a tick may spend: the budget, or what others leave of the period if that is less.
+
+        Never less than the least count costs, as long as the budget has that: who leaves the tick no time at all
+        leaves a thinner one none either.
+        """
+        left = PERIOD_SHARE * self._period - self._waits.value
+        return min(self._budget, max(left, self.fixed + self.per_particle * self._smallest))
+
+    @property
     def supply(self) -> float:
         """Particles that the budget pays for, before bounds and hysteresis."""
-        remaining = max(self._budget - self.fixed, 0.0)
+        remaining = max(self.room - self.fixed, 0.0)
         per_particle = self.per_particle
         return remaining / per_particle if per_particle > 0.0 else float(self._largest)
+
+    def reserve(self, count: int) -> float:
+        """Seconds to keep for what follows the weighing of ``count`` particles: resampling, extraction, the sending."""
+        stages = (self._stage_at(stage, count) for stage in ("resampling", "extraction"))
+        sending = (self._fixed[stage].value for stage in ("publishing", CLOUD) if stage in self._fixed)
+        return sum(stages) + sum(sending)
 
     def decide(self, demand: int) -> Decision:
         """Decide on the next tick, for a belief that needs ``demand`` particles."""
         supply = self.supply
+        self._follow(supply)
+        count = min(max(demand, self._smallest), int(self._limit))
+        # the product that made the room may round to a hair less than it was made from
+        afforded = int(min(self._limit, supply * (1.0 + 1e-9)))
+        fits = afforded >= self._smallest
+        self._climb(WHOLE if fits else self._fitting())
+        if self._rung.level is Level.PREDICTION_ONLY:
+            self._fade()
+        level = max(self._rung.level, Level.FEWER_PARTICLES if count < demand else Level.FULL)
+        return Decision(count, afforded, level, self._cause(level), self._rung.most)
+
+    def _follow(self, supply: float) -> None:
+        """Shrink the limit at once, let it grow slowly."""
+        self._since_shrinking += 1
         if supply < self._limit:
             self._limit = self._clamped(supply)
-        elif self._limit < HEADROOM * supply:
+            self._since_shrinking = 0
+        elif self._limit < HEADROOM * supply and self._since_shrinking > SETTLE:
             self._limit = self._clamped(min(GROWTH * self._limit, HEADROOM * supply))
-        count = min(max(demand, self._smallest), int(self._limit))
-        afforded = int(min(self._limit, supply))
-        return Decision(count, afforded, Level.FEWER_PARTICLES if count < demand else Level.FULL)
+
+    def _fitting(self) -> Rung:
+        """Return the first rung on which a tick with the least count fits."""
+        if len(self._each):
+            each = self._each.value * self._work_at(self._smallest)
+        else:
+            each = sum(self._stage_at(stage, self._smallest) for stage in PER_MEASUREMENT)
+        fixed = sum(cost.value for stage, cost in self._fixed.items() if stage != CLOUD)
+        left = self.room - fixed - self._stage_at("extraction", self._smallest)
+        cloud = self._fixed[CLOUD].value if CLOUD in self._fixed else 0.0
+        for level, spare in ((Level.THINNED, left - cloud), (Level.NO_CLOUD, left)):
+            if spare >= each:
+                return Rung(level, min(CROWD, int(spare / each) if each > 0.0 else CROWD))
+        return Rung(Level.PREDICTION_ONLY, 0)
+
+    def _climb(self, wanted: Rung) -> None:
+        """Take a worse rung at once, a better one after it has been wanted for a while."""
+        if wanted.level >= self._rung.level:
+            self._rung, self._calm = wanted, 0
+            return
+        self._calm += 1
+        if self._calm >= CALM:
+            self._rung, self._calm = wanted, 0
+
+    def _fade(self) -> None:
+        self._each.scale(FADING)
+        for stage in ("sensing", "resampling"):
+            if stage in self._scales:
+                self._scales[stage].scale(FADING)
+
+    def _cause(self, level: Level) -> Cause:
+        if level is Level.FULL:
+            return Cause.NONE
+        return Cause.PROCESSOR if self.room < self._budget else Cause.BUDGET
+
+    def _stage_at(self, stage: str, count: int) -> float:
+        return self._scales[stage].value * self._shapes[stage].at(count) if stage in self._scales else 0.0
+
+    def _work_at(self, count: int) -> float:
+        return sum(self._shapes[stage].at(count) for stage in PER_MEASUREMENT if stage in self._shapes)
 
     def _clamped(self, count: float) -> float:
         return min(max(count, float(self._smallest)), float(self._largest))

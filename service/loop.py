@@ -6,6 +6,7 @@ is a datagram on a queue that the kernel bounds; what a queue refuses is counted
 
 from __future__ import annotations
 
+import resource
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
@@ -18,8 +19,11 @@ from drivers.sample import Sample
 from service.budget import Meters
 from service.channels import BUDGET, ESTIMATE, HEALTH, SENSORS, Heart, Outlet, cloud
 from service.config import Configuration
+from service.debt import Debt
+from service.decisions import DecisionSender
 from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Sensors, SensorStatus
-from service.governor import Governor, Shape
+from service.estimator.course import Course, Level
+from service.governor import CLOUD, PER_MEASUREMENT, Decision, Governor, Shape
 from service.inlet import Inlet
 from service.schedule import NANOSECONDS, Schedule
 
@@ -29,8 +33,8 @@ INGEST_SHARE = 0.5
 BEAT_RATE = 10.0
 CLOUD_RATE = 5.0
 
-_FIXED_STAGES = ("ingest", "publishing")
 _OTHER = "other"
+_FIXED_STAGES = ("ingest", "publishing", _OTHER)
 
 
 class Estimator(Protocol):
@@ -50,7 +54,7 @@ class Estimator(Protocol):
         """Take samples in."""
         ...
 
-    def tick(self, now_ns: int, unix_ns: int, afforded: int, /) -> Estimate:
+    def tick(self, now_ns: int, unix_ns: int, afforded: int, course: Course, /) -> Estimate:
         """Bring the belief to now."""
         ...
 
@@ -82,6 +86,8 @@ class Loop:
         Line to the supervisor.
     shapes : Mapping[str, Shape]
         What the stages cost in the rehearsal, for the governor to start from.
+    decisions : DecisionSender, optional
+        Where a record of every tick goes.
     """
 
     def __init__(
@@ -93,6 +99,7 @@ class Loop:
         outlet: Outlet,
         heart: Heart,
         shapes: Mapping[str, Shape],
+        decisions: DecisionSender | None = None,
     ) -> None:
         self._rate = configuration.loop.rate
         self._budget_ms = configuration.budget.cpu_ms
@@ -103,7 +110,13 @@ class Loop:
         self._outlet = outlet
         self._heart = heart
         bounds = configuration.budget.particles_min, configuration.budget.particles_max
-        self._governor = Governor(self._budget_ms * 1e-3, *bounds, shapes)
+        self._governor = Governor(self._budget_ms * 1e-3, *bounds, shapes, 1.0 / self._rate)
+        self._debt = Debt(self._budget_ms * 1e-3, 1.0 / self._rate)
+        self._decisions = decisions
+        self._spare = 0.0
+        self._course = Course(overrunning=self._overrunning)
+        self._taken = [0] * len(inlets)
+        self._booked = 0
         slices = max(1, len(inlets))
         self._slice_ns = round(INGEST_SHARE * self._budget_ms * 1e-3 * NANOSECONDS / slices)
         self._second = max(1, round(self._rate))
@@ -117,6 +130,10 @@ class Loop:
         """Ticks done."""
         self.overruns = 0
         """Ticks that cost more than the budget."""
+        self.cuts = 0
+        """Ticks whose weighing was ended early."""
+        self._levels = dict.fromkeys(Level, 0)
+        self._faults = _page_faults()
 
     @property
     def missed_ticks(self) -> int:
@@ -126,6 +143,7 @@ class Loop:
     def run(self, stopped: Callable[[], bool]) -> None:
         """Tick until ``stopped`` says so, which is asked once per tick."""
         self._schedule = Schedule(self._rate, time.monotonic_ns())
+        self._booked = -1
         while not stopped():
             deadline = self._schedule.deadline_ns
             ahead = deadline - time.monotonic_ns()
@@ -140,22 +158,36 @@ class Loop:
 
     def tick(self, now_ns: int) -> Estimate:
         """Do one tick: take, decide, estimate, publish."""
-        meters = self._meters
+        meters, course = self._meters, self._course
         meters.begin()
-        for inlet in self._inlets:
+        for index, inlet in enumerate(self._inlets):
+            before = inlet.samples
             inlet.drain(self._estimator.ingest, time.monotonic_ns() + self._slice_ns)
+            self._taken[index] = inlet.samples - before
         meters.lap("ingest")
         decision = self._governor.decide(self._estimator.demand)
+        self._spare = self._budget_ms * 1e-3 - self._governor.reserve(decision.count)
+        course.set(decision.level, decision.cause, decision.most)
         meters.lap(_OTHER)
-        estimate = self._estimator.tick(now_ns, time.time_ns(), decision.afforded)
+        unix_ns = time.time_ns()
+        estimate = self._estimator.tick(now_ns, unix_ns, decision.afforded, course)
         meters.lap("extraction")
         self._send(ESTIMATE, estimate)
         self._send_health(estimate)
         self._send_at_leisure(estimate, now_ns)
+        if self._decisions is not None:
+            self._decisions.send(self.ticks, now_ns, unix_ns, decision.afforded, course, self._taken)
         meters.lap("publishing")
+        self._send_cloud_in_turn(estimate, decision)
         self._learn(estimate.particles)
+        self._levels[Level(estimate.level)] += 1
+        self.cuts += course.cut
         self.ticks += 1
         return estimate
+
+    def _overrunning(self) -> bool:
+        """Say whether what the tick has spent leaves only what must still be done."""
+        return self._meters.spent > self._spare
 
     def _send(self, tag: bytes, value: msgspec.Struct) -> None:
         self._datagram[:1] = tag
@@ -184,29 +216,49 @@ class Loop:
             self._send(BUDGET, self.budget(estimate))
         elif phase == self._second // 2:
             self._send(SENSORS, self.sensors(estimate.time, now_ns))
-        if self._cloud_count and self.ticks % self._cloud_every == self._cloud_every // 2:
-            self._send_cloud(estimate)
-        if self.ticks % self._beat_every == 0:
+        if self.ticks % self._beat_every == 0 or self._course.rested:
             self._heart.beat()
 
-    def _send_cloud(self, estimate: Estimate) -> None:
-        if estimate.health == HealthState.WAITING:
+    def _send_cloud_in_turn(self, estimate: Estimate, decision: Decision) -> None:
+        due = self.ticks % self._cloud_every == self._cloud_every // 2
+        wanted = self._cloud_count and estimate.health != HealthState.WAITING
+        if not (due and wanted) or decision.level >= Level.NO_CLOUD:
             return
         rows = self._estimator.cloud(self._cloud_count)
         description = self._encoder.encode(Cloud(len(rows), estimate.time))
         self._outlet.send(cloud(description, np.ascontiguousarray(rows, "<f4").tobytes()))
+        self._meters.lap(CLOUD)
+        self._governor.observe(CLOUD, self._meters.costs[CLOUD], 0)
 
     def _learn(self, particles: int) -> None:
+        """Tell the governor what the tick cost, and what it would have cost with every measurement weighed."""
+        course, work = self._course, 0.0
         for stage, seconds in self._meters.costs.items():
-            if stage in _FIXED_STAGES or stage == _OTHER:
+            if stage in _FIXED_STAGES:
                 self._governor.observe(stage, seconds, 0)
-            elif particles and seconds > 0.0:
+            elif stage == CLOUD or not particles or seconds <= 0.0:
+                continue
+            elif stage in PER_MEASUREMENT:
+                work += seconds
+                if course.weighed or not course.offered:
+                    whole = course.offered / course.weighed if course.weighed else 1.0
+                    self._governor.observe(stage, seconds * whole, particles)
+            else:
                 self._governor.observe(stage, seconds, particles)
+        if particles and course.weighed:
+            self._governor.observe_measurement(work / course.weighed, particles)
         self._meters.lap(_OTHER)
 
     def _account(self, lateness: float, duration: float) -> None:
+        """Close the tick; when it was far over the budget, leave out as many as pay for it."""
         cost = self._meters.end(lateness, duration)
+        self._governor.observe_wait(lateness + duration - cost)
         self.overruns += cost > self._budget_ms * 1e-3
+        periods = self._schedule.tick - self._booked
+        self._booked = self._schedule.tick
+        self._course.rested = self._debt.charge(cost, periods)
+        if self._course.rested:
+            self._schedule.rest(self._course.rested)
 
     def budget(self, estimate: Estimate) -> Budget:
         """Return what the loop spent over the last second, and what it gave up since the start."""
@@ -227,12 +279,25 @@ class Loop:
             lateness=self._meters.recent_lateness(),
             queues={inlet.name: inlet.waiting for inlet in self._inlets},
             drops=self.drops(),
+            rested_ticks=self._schedule.rested,
+            cut_ticks=self.cuts,
+            levels={str(int(level)): count for level, count in self._levels.items()},
+            level_reason=estimate.level_reason,
+            run_lateness=self._meters.lateness.distribution(),
+            run_duration=self._meters.durations.distribution(),
+            page_faults=self._new_faults(),
         )
+
+    def _new_faults(self) -> int:
+        before, self._faults = self._faults, _page_faults()
+        return self._faults - before
 
     def drops(self) -> dict[str, int]:
         """Return what was dropped since the start, by what."""
         drops = {f"link {inlet.name}": inlet.dropped for inlet in self._inlets}
         drops["publisher"] = self._outlet.dropped
+        if self._decisions is not None:
+            drops["decisions"] = self._decisions.dropped
         drops["undecodable"] = sum(inlet.undecodable for inlet in self._inlets)
         return drops | self._estimator.drops
 
@@ -240,7 +305,8 @@ class Loop:
         """Return the whole run in one line."""
         lateness, duration = self._meters.lateness, self._meters.durations
         return (
-            f"{self.ticks} ticks, {self.missed_ticks} missed, {self.overruns} over the budget; "
+            f"{self.ticks} ticks, {self.missed_ticks} missed, {self._schedule.rested} rested, "
+            f"{self.overruns} over the budget; "
             f"lateness median {1e3 * lateness.quantile(0.5):.2f}, 99 % {1e3 * lateness.quantile(0.99):.2f}, "
             f"worst {1e3 * lateness.worst:.2f} ms; duration median {1e3 * duration.quantile(0.5):.2f}, "
             f"99 % {1e3 * duration.quantile(0.99):.2f}, worst {1e3 * duration.worst:.2f} ms"
@@ -251,3 +317,8 @@ class Loop:
         return Sensors(
             unix, self._estimator.sensors(now_ns), [inlet.status(now_ns) for inlet in self._inlets]
         )
+
+
+def _page_faults() -> int:
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_minflt + usage.ru_majflt

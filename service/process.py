@@ -1,6 +1,6 @@
 """Entry of every process but the supervisor, and started only by it: ``python -m service.process <role> …``.
 
-The roles are ``loop``, ``publisher`` and ``link``. The arguments are numbers of descriptors that the
+The roles are ``loop``, ``publisher``, ``recorder`` and ``link``. The arguments are numbers of descriptors that the
 supervisor passes on; see :mod:`service.wiring`.
 """
 
@@ -14,6 +14,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import NoReturn
 
 from service import kernels
@@ -34,12 +35,16 @@ def _arguments() -> argparse.ArgumentParser:
     loop = roles.add_parser("loop")
     loop.add_argument("--heart", type=int, required=True)
     loop.add_argument("--publisher", type=int, required=True)
+    loop.add_argument("--decisions", type=int)
     loop.add_argument("--link", action="append", default=[], metavar="NAME=DESCRIPTOR")
     link = roles.add_parser("link")
     link.add_argument("--name", required=True)
     link.add_argument("--heart", type=int, required=True)
     link.add_argument("--samples", type=int, required=True)
-    for role in (publisher, loop, link):
+    recorder = roles.add_parser("recorder")
+    recorder.add_argument("--records", type=int, required=True)
+    recorder.add_argument("--file", type=Path, required=True)
+    for role in (publisher, loop, link, recorder):
         role.add_argument("--parent", type=int, required=True)
         role.add_argument("--configuration", type=int, required=True)
     return parser
@@ -49,6 +54,12 @@ def _publisher(configuration: Configuration, arguments: argparse.Namespace) -> N
     from service.publish.zenoh import run
 
     run(configuration, inherited(arguments.estimates))
+
+
+def _recorder(configuration: Configuration, arguments: argparse.Namespace) -> None:
+    from service.recorder import run
+
+    run(arguments.file, [link.name for link in configuration.link], inherited(arguments.records))
 
 
 def _link(configuration: Configuration, arguments: argparse.Namespace) -> None:
@@ -75,6 +86,7 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
     kernels.warm(lambda name, done, count: heart.announce(f"compiling kernels, {done} of {count}: {name}"))
 
     from service.budget import Meters
+    from service.decisions import DecisionSender
     from service.estimator import Estimator
     from service.inlet import Inlet
     from service.loop import Loop
@@ -83,7 +95,10 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
     heart.announce("rehearsing")
     shapes = rehearse(configuration)
     meters = Meters(configuration.loop.rate)
-    links = (argument.rpartition("=") for argument in arguments.link)
+    links = [argument.rpartition("=") for argument in arguments.link]
+    decisions = None
+    if arguments.decisions is not None:
+        decisions = DecisionSender(Outlet(inherited(arguments.decisions)), len(links))
     loop = Loop(
         configuration,
         Estimator(configuration, meters),
@@ -92,6 +107,7 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
         Outlet(inherited(arguments.publisher)),
         heart,
         shapes,
+        decisions,
     )
     stopped = _stop_flag()
     for refusal in punctual(configuration.loop.priority, configuration.loop.cpus):
@@ -113,7 +129,7 @@ def _stop_flag() -> Callable[[], bool]:
     return lambda: stop
 
 
-_ROLES = {"publisher": _publisher, "loop": _loop, "link": _link}
+_ROLES = {"publisher": _publisher, "recorder": _recorder, "loop": _loop, "link": _link}
 
 
 def main() -> NoReturn:

@@ -48,6 +48,11 @@ class RunningQuantile:
         self._arrived.append(value)
         insort(self._ordered, value)
 
+    def scale(self, factor: float) -> None:
+        """Multiply every remembered value by a positive factor."""
+        self._arrived = deque(factor * value for value in self._arrived)
+        self._ordered = [factor * value for value in self._ordered]
+
     @property
     def value(self) -> float:
         """The quantile; 0.0 while nothing has been added."""

@@ -27,6 +27,13 @@ class Schedule:
         self._tick = 0
         self.missed = 0
         """Ticks that were never done because an earlier one took too long."""
+        self.rested = 0
+        """Ticks that were left out on purpose."""
+
+    @property
+    def tick(self) -> int:
+        """Number of the tick to do next, counted in periods from the start."""
+        return self._tick
 
     @property
     def deadline_ns(self) -> int:
@@ -39,3 +46,8 @@ class Schedule:
         following = max(self._tick + 1, due)
         self.missed += following - self._tick - 1
         self._tick = following
+
+    def rest(self, ticks: int) -> None:
+        """Leave out the ticks that come next."""
+        self._tick += ticks
+        self.rested += ticks

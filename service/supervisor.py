@@ -345,8 +345,15 @@ def _noted(_signal: int, _frame: object) -> None:
     """Let a signal through to the wake-up descriptor."""
 
 
-def run(path: Path) -> int:
+def run(path: Path, decisions: Path | None = None) -> int:
     """Run the daemon that a configuration file describes, until SIGTERM; return the exit status.
+
+    Parameters
+    ----------
+    path : Path
+        The configuration file.
+    decisions : Path, optional
+        Where the decision log goes.
 
     Raises
     ------
@@ -354,7 +361,7 @@ def run(path: Path) -> int:
         The file is wrong.
     """
     write_log()
-    with contextlib.closing(Wiring(path)) as wiring:
+    with contextlib.closing(Wiring(path, decisions)) as wiring:
         return Supervisor(wiring, Notifier()).run()
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import fcntl
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from service.channels import Outlet, Pair, pair
@@ -19,11 +20,13 @@ from service.config import Configuration, load
 
 PUBLISHER = "publisher"
 LOOP = "loop"
+RECORDER = "recorder"
 
 LINK_QUEUE = 2 * 1024 * 1024
 """Bytes: about a second of a busy link. What is older than that is of no use to a loop that was away."""
 
 PUBLISHER_QUEUE = 1024 * 1024
+RECORDER_QUEUE = 1024 * 1024
 
 LOOP_START = 180.0
 """Seconds until the first tick: on a slow computer without a cache the kernels are compiled first."""
@@ -41,19 +44,28 @@ _F_SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_WRITE | fcntl.
 class Wiring:
     """The plan of the daemon that a configuration file describes.
 
+    Parameters
+    ----------
+    path : Path
+        The configuration file.
+    decisions : Path, optional
+        Where the decision log goes, at the end of what is there.
+
     Raises
     ------
     ConfigurationError
         The file is wrong.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, decisions: Path | None = None) -> None:
         self._path = path
         self._configuration = load(path)
         self._file = _sealed(self._configuration)
         self._links: dict[str, Pair] = {}
         self._hearts: dict[str, Pair] = {}
         self._estimates = pair(PUBLISHER_QUEUE)
+        self._decisions = decisions
+        self._records = None if decisions is None else pair(RECORDER_QUEUE)
         self.publisher = PUBLISHER
         """Name of the program that publishes."""
         self.statuses = Outlet(self._estimates.outlet)
@@ -74,9 +86,14 @@ class Wiring:
         self._disconnect(self._links, {link.name for link in configuration.link})
 
     def programs(self) -> list[Program]:
-        """Return publisher, loop and links, in this order."""
+        """Return publisher, recorder (where one was asked for), loop and links, in this order."""
         names = [link.name for link in self._configuration.link]
-        return [self._publisher(), self._loop(names), *(self._link(name) for name in names)]
+        return [
+            self._publisher(),
+            *self._recorder(names),
+            self._loop(names),
+            *(self._link(name) for name in names),
+        ]
 
     def call(self) -> None:
         """Have the loop say again what it says only on change."""
@@ -87,6 +104,8 @@ class Wiring:
         self._disconnect(self._links, set())
         self._disconnect(self._hearts, set())
         self._estimates.close()
+        if self._records is not None:
+            self._records.close()
         os.close(self._file)
 
     def _publisher(self) -> Program:
@@ -99,15 +118,31 @@ class Wiring:
             environment=_single_threaded(1),
         )
 
+    def _recorder(self, names: list[str]) -> Iterator[Program]:
+        if self._decisions is None or self._records is None:
+            return
+        inlet = self._records.inlet.fileno()
+        yield Program(
+            RECORDER,
+            self._command("recorder", "--records", inlet, "--file", str(self._decisions.absolute())),
+            (self._file, inlet),
+            "\n".join(names),
+            environment=_single_threaded(1),
+        )
+
     def _loop(self, names: list[str]) -> Program:
         heart = self._heart(LOOP)
         ends = [self._connection(name).inlet.fileno() for name in names]
         outlet = self._estimates.outlet.fileno()
         named = [word for name, end in zip(names, ends, strict=True) for word in ("--link", f"{name}={end}")]
+        records: list[int] = []
+        if self._records is not None:
+            records.append(self._records.outlet.fileno())
+            named += ["--decisions", str(records[0])]
         return Program(
             LOOP,
             self._command("loop", "--heart", heart.outlet.fileno(), "--publisher", outlet, *named),
-            (self._file, heart.outlet.fileno(), outlet, *ends),
+            (self._file, heart.outlet.fileno(), outlet, *ends, *records),
             self._configuration.model_dump_json(exclude={"state"}),
             heart.inlet,
             max(LOOP_PATIENCE, LOOP_PATIENCE_TICKS / self._configuration.loop.rate),

@@ -7,13 +7,15 @@ from typing import Annotated
 
 import typer
 
-from service.cli.failure import leave
+from service.cli.failure import CommandError, leave
 
 NAME = "run"
 EPILOG = """
 [bold]Examples[/bold]
 
 beliefd run robot.toml
+
+beliefd run robot.toml --decisions run.csv [dim]· what every tick was allowed, for a replay[/dim]
 
 kill -HUP [dim]PID · read the file again, or keep the old one and say why not[/dim]
 
@@ -23,13 +25,28 @@ kill -TERM [dim]PID · stop within two seconds, exit 0[/dim]
 
 def command(
     configuration: Annotated[Path, typer.Argument(help="The configuration file (TOML).", metavar="CONFIG")],
+    decisions: Annotated[
+        Path | None,
+        typer.Option(help="Write a decision log (CSV): count, level and cut of every tick.", metavar="FILE"),
+    ] = None,
 ) -> None:
     """Run the daemon in the foreground until SIGTERM."""
     from service import kernels
     from service.config import load
 
     load(configuration)  # every error at once, before a process is started
+    _begin(decisions)
     kernels.prepare()
     from service import supervisor
 
-    leave(supervisor.run(configuration))
+    leave(supervisor.run(configuration, decisions))
+
+
+def _begin(decisions: Path | None) -> None:
+    """Empty the decision log, which the recording process then writes at the end of."""
+    if decisions is None:
+        return
+    try:
+        decisions.write_text("")
+    except OSError as error:
+        raise CommandError(f"{decisions}: cannot be written: {error.strerror}") from error

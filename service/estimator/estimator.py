@@ -32,10 +32,12 @@ from service.estimator.binding import (
 )
 from service.estimator.companion import Companion
 from service.estimator.controls import Controls
+from service.estimator.course import CROWD, Cause, Course, Level
 from service.estimator.output import Output
 from service.estimator.records import SensorRecord, SensorRecords
 from service.estimator.start import Anchor, draw
 from service.estimator.stopwatch import Silent, Stopwatch
+from service.estimator.thinning import spaced
 from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 from service.geodesy import Geodetic, LocalFrame
@@ -49,9 +51,7 @@ TOGETHER = SECOND // 1000
 """Measurements within a millisecond are weighed at one time."""
 
 FEW = 8
-CROWD = 64
-"""Up to a few measurements per tick are weighed each at its own time; more of them share four times; of a crowd, every
-n-th is taken and the rest refused as ``thinned``: on time goes first (degradation level 2)."""
+"""Up to a few measurements per tick are weighed each at its own time; more of them share four times."""
 
 OUTLIER = 0.5
 """Probability of being the outlier part's from which a measurement counts as refused: it moved next to nothing."""
@@ -136,7 +136,7 @@ class Estimator:
         self._demand = configuration.budget.particles_min
         self._demand_time = -(2**62)
         self._sequence = 0
-        self._thinning = False
+        self._freely = Course()
         self._companions: list[Companion] = []
 
     def accompany(self, make: Callable[[Vehicle, Belief], C]) -> C:
@@ -197,8 +197,11 @@ class Estimator:
 
     # --- one tick -----------------------------------------------------------------------------------------------
 
-    def tick(self, now: int, unix: int, afforded: int) -> Estimate:
+    def tick(self, now: int, unix: int, afforded: int, course: Course | None = None) -> Estimate:
         """Move the horizon to ``now`` less its delay and return the belief, carried to ``now``.
+
+        A measurement that the course has no room for is dropped and counted, never kept for the next tick: that one
+        has its own.
 
         Parameters
         ----------
@@ -206,7 +209,12 @@ class Estimator:
             The tick's time, nanoseconds, on the monotonic and on the Unix clock.
         afforded : int
             How many particles the budget allows.
+        course : Course, optional
+            How far the tick may go beside that; by default all the way, but for a crowd of measurements.
         """
+        if course is None:
+            course = self._freely
+            course.set(Level.FULL, Cause.NONE, CROWD)
         horizon = now - round(self.configuration.loop.horizon_ms * 1e6)
         passed = self._timeline.release(horizon)
         self._stopwatch.lap("ingest")
@@ -214,23 +222,28 @@ class Estimator:
         if self._belief_time is None:
             passed = self._try_start(horizon, self._fresh(horizon, passed), afforded)
         if self._belief_time is not None:
-            self._fuse(passed, afforded)
+            self._fuse(passed, afforded, course)
             if horizon - self._belief_time >= STRIDE:
                 self._advance(horizon)
             self._fit_count(afforded)
-            self._reckon_demand(now)
+            if course.level is not Level.PREDICTION_ONLY:
+                self._reckon_demand(now)
         self._controls.forget((horizon if self._belief_time is None else self._belief_time) - SECOND)
-        estimate = self._speak(now, unix, afforded)
+        estimate = self._speak(now, unix, afforded, course)
         self._sequence += 1
         self._stopwatch.lap("extraction")
         return estimate
 
-    def _fuse(self, passed: list[tuple[int, Waiting]], afforded: int) -> None:
+    def _fuse(self, passed: list[tuple[int, Waiting]], afforded: int, course: Course) -> None:
         assert self._belief_time is not None
         fused = False
-        passed = self._thinned(passed)
+        course.offered = len(passed)
+        passed = self._thinned(passed, course)
         together = TOGETHER if len(passed) <= FEW else max(TOGETHER, (passed[-1][0] - passed[0][0]) // 4)
-        for time, waiting in passed:
+        for index, (time, waiting) in enumerate(passed):
+            if not course.goes_on():
+                self._leave_out(passed[index:], "cut")
+                break
             if fused and time - self._belief_time > together:
                 self._resample_if_worn(afforded)
                 fused = False
@@ -241,16 +254,22 @@ class Estimator:
         if fused:
             self._resample_if_worn(afforded)
 
-    def _thinned(self, passed: list[tuple[int, Waiting]]) -> list[tuple[int, Waiting]]:
-        """Take evenly spaced ones of a crowd of measurements, and refuse the rest."""
-        self._thinning = len(passed) > CROWD
-        if not self._thinning:
+    def _thinned(self, passed: list[tuple[int, Waiting]], course: Course) -> list[tuple[int, Waiting]]:
+        """Take as many measurements as the course has room for, and refuse the rest."""
+        if len(passed) <= course.most:
             return passed
-        taken = {index * len(passed) // CROWD for index in range(CROWD)}
-        for index, (_, waiting) in enumerate(passed):
-            if index not in taken:
-                self._refuse(waiting, "thinned")
+        if course.level is Level.PREDICTION_ONLY:
+            self._leave_out(passed, "prediction only")
+            return []
+        taken = set(spaced([waiting.sensor.name(waiting.sample) for _, waiting in passed], course.most))
+        self._leave_out([item for index, item in enumerate(passed) if index not in taken], "thinned")
         return [passed[index] for index in sorted(taken)]
+
+    def _leave_out(self, passed: list[tuple[int, Waiting]], reason: str) -> None:
+        """Count measurements for which the tick had no room, per sensor and in all."""
+        for _, waiting in passed:
+            self._refuse(waiting, reason)
+        self._dropped[reason] += len(passed)
 
     def _advance(self, time: int) -> None:
         """Predict the belief to ``time`` in strides (line 4 of Table 4.3)."""
@@ -381,7 +400,7 @@ class Estimator:
 
     # --- estimates out ------------------------------------------------------------------------------------------
 
-    def _speak(self, now: int, unix: int, afforded: int) -> Estimate:
+    def _speak(self, now: int, unix: int, afforded: int, course: Course) -> Estimate:
         pose = None
         if self._belief_time is not None:
             pose = self._output.at(self._belief_time, now)
@@ -403,14 +422,12 @@ class Estimator:
             monotonic_ns=now,
             health=state,
             reason=self.health.reason,
-            level=self._level(afforded) if pose else 0,
+            level=int(course.reached(self._demand, afforded)) if pose else 0,
+            level_reason=course.reason(self._demand, afforded) if pose else "",
             demanded=self._demand,
             afforded=afforded,
             reset_counter=self.reset_counter,
         )
-
-    def _level(self, afforded: int) -> int:
-        return 2 if self._thinning else int(afforded < self._demand)
 
     @property
     def demand(self) -> int:

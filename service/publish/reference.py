@@ -18,6 +18,7 @@ from msgspec import inspect as types
 from service.estimate import (
     Budget,
     Cloud,
+    Distribution,
     Estimate,
     Health,
     LinkStatus,
@@ -36,6 +37,7 @@ VALUES = (
     Health,
     Budget,
     StageCost,
+    Distribution,
     Sensors,
     SensorStatus,
     LinkStatus,

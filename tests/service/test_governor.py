@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from service.governor import COLD, GROWTH, WINDOW, Decision, Governor, Level, Shape
+from service.estimator import Cause, Level
+from service.governor import COLD, GROWTH, WINDOW, Decision, Governor, Shape
 
 BUDGET = 4e-3
 SMALLEST, LARGEST = 200, 1_000_000
@@ -143,7 +144,7 @@ def test_starved_says_less_than_the_minimum_but_uses_it() -> None:
     governor = fresh()
     for _ in range(WINDOW):
         governor.observe("motion", 1.0, SMALLEST)
-    assert governor.decide(5_000) == Decision(SMALLEST, 0, Level.FEWER_PARTICLES)
+    assert governor.decide(5_000) == Decision(SMALLEST, 0, Level.PREDICTION_ONLY, Cause.BUDGET, 0)
 
 
 def test_fixed_cost_alone_can_eat_the_budget() -> None:

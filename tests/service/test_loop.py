@@ -16,6 +16,7 @@ from service.budget import Meters
 from service.channels import Heart, Outlet, Pair, pair, undertaking
 from service.config import Configuration, load
 from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Sensors, SensorStatus
+from service.estimator import Course
 from service.governor import Shape
 from service.inlet import Inlet
 from service.loop import Loop
@@ -58,7 +59,7 @@ class SmallEstimator:
     def ingest(self, samples: Iterable[Sample], /) -> None:
         self.taken.extend(samples)
 
-    def tick(self, now_ns: int, unix_ns: int, afforded: int, /) -> Estimate:
+    def tick(self, now_ns: int, unix_ns: int, afforded: int, course: Course, /) -> Estimate:
         self.meters.lap("motion")
         self.afforded.append(afforded)
         if self.stall:
