@@ -52,6 +52,15 @@ def command(
         int | None,
         typer.Option(help="Use exactly this many particles, whatever the budget.", min=10, max=10_000_000),
     ] = None,
+    decisions: Annotated[
+        Path | None,
+        typer.Option(
+            help="Give every tick what a recorded run gave it (beliefd run --decisions FILE).",
+            metavar="FILE",
+            exists=True,
+            dir_okay=False,
+        ),
+    ] = None,
 ) -> None:
     """Replay recordings and print the error, the coverage and the health."""
     from service import kernels
@@ -59,4 +68,4 @@ def command(
     kernels.prepare()
     from service import replay
 
-    leave(replay.command(logs, config, truth, seeds, out, report, as_json, particles))
+    leave(replay.command(logs, config, truth, seeds, out, report, as_json, particles, decisions))

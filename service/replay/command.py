@@ -9,6 +9,8 @@ from pathlib import Path
 
 from rich.console import Console
 
+from service.decisions import DecisionLogError
+from service.decisions import read as read_decisions
 from service.replay.bars import run_with_bars
 from service.replay.run import Plan, Run
 from service.replay.seeds import summary
@@ -81,6 +83,7 @@ def command(
     report: Path | None,
     as_json_object: bool,
     particles: int | None,
+    decisions: Path | None = None,
 ) -> int:
     """Run ``beliefd replay`` and return its exit status: 0 done, 1 a log could not be replayed."""
     console = Console(stderr=as_json_object)
@@ -88,10 +91,12 @@ def command(
         if report is not None:
             require_report()
         plan = plan_of(tuple(logs), config, truth, out, particles or PARTICLES, console)
+        if decisions is not None:
+            plan = replace(plan, decisions=tuple(read_decisions(decisions)))
         runs = run_with_bars(replace(plan, traced=None if report is None else 0), list(range(seeds)), console)
         if report is not None:
             write_report(report, plan, runs)
-    except (LogError, ReportError, ValueError, OSError) as error:
+    except (LogError, ReportError, DecisionLogError, ValueError, OSError) as error:
         console.print(f"[red]{error}[/red]", highlight=False)
         return 1
     if as_json_object:

@@ -7,7 +7,7 @@ estimates are the ones that the daemon would have published, had it been there w
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import chain
@@ -18,7 +18,8 @@ import msgspec
 from drivers.logs import LogReader
 from drivers.sample import LinkReport, Sample
 from service.config import Configuration
-from service.estimator import Estimator
+from service.decisions import Decided
+from service.estimator import Course, Estimator
 from service.estimator.shadow import Shadow
 from service.replay.rows import EstimateFile
 from service.replay.sources import LogError, merged, open_log
@@ -48,6 +49,8 @@ class Plan:
         Folder for ``estimates_seedN.csv``.
     traced : int or None
         The seed whose run is written down tick by tick, for a report.
+    decisions : tuple[Decided, ...] or None
+        What every tick of a recorded run was allowed; the replay then has its ticks and counts, not ``particles``.
     """
 
     logs: tuple[Path, ...]
@@ -56,6 +59,7 @@ class Plan:
     truth: Truth | None = None
     out: Path | None = None
     traced: int | None = None
+    decisions: tuple[Decided, ...] | None = None
 
 
 @dataclass
@@ -127,6 +131,27 @@ def ticks_of(samples: Iterator[Sample], rate: float) -> Iterator[tuple[int, list
     yield deadline, batch
 
 
+def ticks_decided(
+    samples: Iterator[Sample], decisions: Sequence[Decided]
+) -> Iterator[tuple[int, list[Sample], int, Course]]:
+    """Cut a stream of samples into the ticks of a recorded run, by its Unix clock: time, samples, count, course."""
+    waiting = next(samples, None)
+    for decision in decisions:
+        batch: list[Sample] = []
+        while waiting is not None and waiting.received <= decision.unix:
+            batch.append(waiting)
+            waiting = next(samples, None)
+        yield decision.unix, batch, decision.afforded, decision.course()
+
+
+def _ticks(samples: Iterator[Sample], plan: Plan) -> Iterator[tuple[int, list[Sample], int, Course | None]]:
+    if plan.decisions is not None:
+        yield from ticks_decided(samples, plan.decisions)
+        return
+    for now, batch in ticks_of(samples, plan.configuration.loop.rate):
+        yield now, batch, plan.particles, None
+
+
 def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: None) -> Run:
     """Replay ``plan`` once with ``seed``.
 
@@ -150,9 +175,9 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
         if plan.out is not None:
             file = stack.enter_context(EstimateFile(plan.out / f"estimates_seed{seed}.csv"))
         now = first.received
-        for now, batch in ticks_of(chain([first], samples), plan.configuration.loop.rate):
+        for now, batch, afforded, course in _ticks(chain([first], samples), plan):
             estimator.ingest(batch)
-            estimate = estimator.tick(now, now, plan.particles)
+            estimate = estimator.tick(now, now, afforded, course)
             tally.add(estimate)
             shadow = beside.add(now, estimate.time)
             if tracer is not None:
