@@ -95,6 +95,15 @@ def code(page: Path) -> list[str]:
     return re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page.parent == FILTERS], ids=lambda page: page.stem
+)
+def test_the_code_of_a_filters_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All blocks of a page, one after the other."""
+    monkeypatch.chdir(tmp_path)
+    exec(compile("\n".join(code(page)), str(page), "exec"), {"__name__": page.stem})
+
+
 def test_the_readme_shows_the_subscriber_that_runs() -> None:
     example = (ROOT / "examples" / "subscribe.py").read_text(encoding="utf-8")
     _, _, body = example.partition('"""\n\n')
