@@ -30,7 +30,7 @@ Pictures need matplotlib: pip install 'beliefd\\[textbook]'.
 def command(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[EXERCISE|FIGURE]...", help="Which; all of them if none is named."),
+        typer.Argument(metavar="EXERCISE|FIGURE", help="Which; all of them if none is named."),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the pictures, SVG.", metavar="DIR")] = Path(
         "textbook"
