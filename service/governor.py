@@ -59,6 +59,9 @@ FADING = 0.98
 PERIOD_SHARE = 0.9
 """Of the period, what ticks may last, waiting included."""
 
+LEAST_SHARE = 0.25
+"""Of the budget, what is spent however long ticks wait: few particles do not make others faster."""
+
 PER_MEASUREMENT = ("motion", "sensing", "resampling")
 """Stages whose cost grows with the number of measurements, too."""
 
@@ -209,11 +212,12 @@ class Governor:
     def room(self) -> float:
         """Seconds that a tick may spend: the budget, or what others leave of the period if that is less.
 
-        Never less than the least count costs, as long as the budget has that: who leaves the tick no time at all
-        leaves a thinner one none either.
+        Others take away no more than :data:`LEAST_SHARE` leaves, and never the least count that the budget has: who
+        leaves a tick no time leaves a thinner one none either.
         """
         left = PERIOD_SHARE * self._period - self._waits.value
-        return min(self._budget, max(left, self.fixed + self.per_particle * self._smallest))
+        least = max(LEAST_SHARE * self._budget, self.fixed + self.per_particle * self._smallest)
+        return min(self._budget, max(left, least))
 
     @property
     def supply(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from service.budget import Histogram, Meters, Ring
@@ -32,6 +32,7 @@ def test_ring_needs_room() -> None:
         Ring(0)
 
 
+@settings(deadline=None)  # a busy machine is no failure
 @given(st.lists(st.floats(2e-6, 90.0), min_size=1, max_size=300), st.floats(0.01, 1.0))
 def test_histogram_quantile_is_at_most_one_bin_above(values: list[float], probability: float) -> None:
     """Bins of ten per octave: never below the exact quantile, and at most 2^0.1 = 7.2 % above."""
@@ -100,3 +101,24 @@ def test_a_stage_unheard_of_gets_a_ring() -> None:
     meters.lap("map")
     meters.end(0.0, 0.0)
     assert meters.stages()["map"].worst == pytest.approx(1e-3)
+
+
+def test_a_distribution_adds_up() -> None:
+    """A thousand ticks of 1 ms and one of 50 ms: the bins hold all of them, the percentiles lie in their bins."""
+    histogram = Histogram()
+    for _ in range(1000):
+        histogram.add(1e-3)
+    histogram.add(50e-3)
+    said = histogram.distribution()
+    assert said.ticks == sum(count for _, count in said.bins) == 1001
+    assert [count for _, count in said.bins] == [1000, 1]
+    assert 1.0 <= said.median == said.p99 <= 1.0 * 2**0.1
+    assert said.p9999 == said.worst == 50.0
+
+
+def test_spent_is_the_time_since_the_tick_began() -> None:
+    now = 0
+    meters = Meters(10.0, lambda: now)
+    meters.begin()
+    now = 3_000_000
+    assert meters.spent == pytest.approx(3e-3)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from service.estimator import Cause, Level
-from service.governor import COLD, GROWTH, WINDOW, Decision, Governor, Shape
+from service.governor import COLD, GROWTH, SETTLE, WINDOW, Decision, Governor, Shape
 
 BUDGET = 4e-3
 SMALLEST, LARGEST = 200, 1_000_000
@@ -204,3 +206,129 @@ def test_without_shapes_the_whole_cost_counts_per_particle() -> None:
 def test_refuses_what_cannot_be_governed(budget: float, smallest: int, largest: int) -> None:
     with pytest.raises(ValueError, match=r"budget|particles"):
         Governor(budget, smallest, largest, {})
+
+
+class Vehicle:
+    """A computer on which a tick costs ``fixed``, ``cloud`` when it is sent, and ``each`` per measurement."""
+
+    def __init__(self, fixed: float, cloud: float, each: float) -> None:
+        self.fixed, self.cloud, self.each = fixed, cloud, each
+        self.offered = 20
+
+    def tick(self, governor: Governor) -> tuple[Decision, float]:
+        decision = governor.decide(5_000)
+        governor.observe("ingest", self.fixed, 0)
+        total = self.fixed
+        if decision.level < Level.NO_CLOUD:
+            governor.observe("cloud", self.cloud, 0)
+            total += self.cloud
+        weighed = min(decision.most, self.offered)
+        if weighed:
+            governor.observe("sensing", self.each * self.offered, decision.count)
+            governor.observe_measurement(self.each, decision.count)
+        return decision, total + weighed * self.each
+
+    def run(self, governor: Governor, ticks: int) -> list[tuple[Decision, float]]:
+        return [self.tick(governor) for _ in range(ticks)]
+
+
+def only_sensing(period: float = 1.0) -> Governor:
+    return Governor(BUDGET, SMALLEST, LARGEST, {"sensing": Shape(1e-4, 1e-7)}, period)
+
+
+@pytest.mark.parametrize(
+    ("fixed", "cloud", "each", "level", "most"),
+    [
+        (1e-3, 0.1e-3, 0.01e-3, Level.FULL, 64),  # 20 measurements of 10 µs: nothing is given up
+        (1e-3, 1.1e-3, 0.25e-3, Level.THINNED, 7),  # 4 ms less 2.1 ms: seven of 0.25 ms
+        (1e-3, 2.9e-3, 0.25e-3, Level.NO_CLOUD, 12),  # not even one beside the cloud, twelve without it
+        (1e-3, 0.1e-3, 3.5e-3, Level.PREDICTION_ONLY, 0),  # 3 ms are left, and one costs 3.5
+    ],
+)
+def test_gives_up_in_the_declared_order(
+    fixed: float, cloud: float, each: float, level: Level, most: int
+) -> None:
+    """Closed form: what is left of 4 ms, in measurements. No tick costs more than the budget once it is learnt."""
+    run = Vehicle(fixed, cloud, each).run(only_sensing(), 70)
+    decision, _ = run[-1]
+    assert (decision.level, decision.most) == (level, most)
+    assert decision.cause is (Cause.BUDGET if level else Cause.NONE)
+    assert max(cost for _, cost in run[30:70]) <= BUDGET + 1e-9
+    if level >= Level.THINNED:
+        assert decision.count == SMALLEST
+        assert decision.afforded < SMALLEST
+
+
+def test_what_is_not_measured_any_more_is_tried_again() -> None:
+    """At prediction only nothing tells that measurements have become cheap; within 300 ticks one is tried."""
+    vehicle, governor = Vehicle(1e-3, 0.1e-3, 3.5e-3), only_sensing()
+    vehicle.run(governor, 70)
+    vehicle.each = 0.01e-3
+    levels = [decision.level for decision, _ in vehicle.run(governor, 500)]
+    assert Level.PREDICTION_ONLY in levels
+    assert levels[300] < Level.PREDICTION_ONLY
+    assert levels[-1] <= Level.FEWER_PARTICLES
+
+
+def test_tries_in_vain_seldom() -> None:
+    """A measurement that costs ten budgets: at most one tick in fifty overruns for the sake of trying."""
+    vehicle, governor = Vehicle(1e-3, 0.1e-3, 10 * BUDGET), only_sensing()
+    vehicle.run(governor, 100)
+    costs = [cost for _, cost in vehicle.run(governor, 2_000)]
+    assert 1 <= sum(cost > BUDGET for cost in costs) <= 40
+
+
+def test_a_better_level_is_taken_after_a_while_only() -> None:
+    """The need for thinning comes and goes in every tick; the level does not follow."""
+    governor = only_sensing()
+    vehicle = Vehicle(1e-3, 1.1e-3, 0.25e-3)
+    vehicle.run(governor, 70)
+    levels: list[Level] = []
+    for tick in range(640):
+        vehicle.each = 0.25e-3 if tick % 40 == 0 else 0.02e-3
+        levels.append(vehicle.tick(governor)[0].level)
+    changes = sum(before != after for before, after in pairwise(levels))
+    assert changes <= 640 / 64 + 1
+
+
+def test_the_count_turns_no_more_often_than_it_may() -> None:
+    """Constant cost with 10 % noise: between two growths that a shrinking separates lie at least 32 ticks."""
+    counts, _ = Machine(noise=0.1).run(fresh(), 4_000)
+    steps = np.sign(np.diff(counts[500:]))
+    shrunk = -SETTLE
+    for tick, step in enumerate(steps):
+        if step < 0:
+            shrunk = tick
+        assert step <= 0 or tick - shrunk >= SETTLE
+    assert np.count_nonzero(steps) <= len(steps) / 20
+
+
+def test_others_on_the_processor_cost_particles() -> None:
+    """Ticks that wait 8 ms of a period of 10 have 1 ms left; with 20 ms of waiting a quarter of the budget stays."""
+    shapes = {"sensing": Shape(0.0, 1e-7)}
+    for wait, room in ((8e-3, 1e-3), (20e-3, 0.25 * BUDGET), (1e-3, BUDGET)):
+        governor = Governor(BUDGET, SMALLEST, LARGEST, shapes, 10e-3)
+        for _ in range(WINDOW):
+            governor.observe_wait(wait)
+        assert governor.room == pytest.approx(room)
+        decision = governor.decide(LARGEST)
+        assert decision.count == pytest.approx(room / (COLD * 1e-7), abs=1)
+        assert decision.cause is (Cause.BUDGET if room == BUDGET else Cause.PROCESSOR)
+
+
+def test_others_alone_never_starve_it() -> None:
+    governor = Governor(BUDGET, 15_000, LARGEST, {"sensing": Shape(0.0, 1e-7)}, 10e-3)
+    for _ in range(WINDOW):
+        governor.observe_wait(1.0)
+    decision = governor.decide(LARGEST)
+    assert decision.count == decision.afforded == 15_000
+    assert decision.level is Level.FEWER_PARTICLES
+
+
+def test_the_reserve_is_what_comes_after_the_weighing() -> None:
+    governor = fresh()
+    for stage, seconds in (("ingest", 1e-3), ("publishing", 2e-4), ("cloud", 1e-4)):
+        for _ in range(WINDOW):
+            governor.observe(stage, seconds, 0)
+    later = sum(SHAPES[stage].at(1_000) for stage in ("resampling", "extraction"))
+    assert governor.reserve(1_000) == pytest.approx(COLD * later + 3e-4)

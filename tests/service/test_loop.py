@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import time
+import tracemalloc
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -16,7 +19,7 @@ from service.budget import Meters
 from service.channels import Heart, Outlet, Pair, pair, undertaking
 from service.config import Configuration, load
 from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Sensors, SensorStatus
-from service.estimator import Course
+from service.estimator import Course, Level
 from service.governor import Shape
 from service.inlet import Inlet
 from service.loop import Loop
@@ -82,12 +85,17 @@ class SmallEstimator:
 class Rig:
     """A loop with the far ends of its queues."""
 
-    def __init__(self, configuration: Configuration, room: int = 1024 * 1024) -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        room: int = 1024 * 1024,
+        estimator: type[SmallEstimator] = SmallEstimator,
+    ) -> None:
         self.links = {link.name: pair(room) for link in configuration.link}
         self.estimates = pair(room)
         self.heart = pair(16 * 1024)
         self.meters = Meters(configuration.loop.rate)
-        self.estimator = SmallEstimator(self.meters)
+        self.estimator = estimator(self.meters)
         self.inlets = [Inlet(name, ends.inlet) for name, ends in self.links.items()]
         self.loop = Loop(
             configuration,
@@ -281,3 +289,103 @@ def test_the_summary_is_one_line(rig: Rig) -> None:
     rig.run(10)
     assert rig.loop.summary().startswith("10 ticks, ")
     assert "\n" not in rig.loop.summary()
+
+
+def burn(seconds: float) -> None:
+    """Use the processor, as a dear estimator does; waiting would cost nothing."""
+    until = time.process_time() + seconds
+    while time.process_time() < until:
+        pass
+
+
+class DearEstimator(SmallEstimator):
+    """Costs ten times the budget, whatever it is told to leave out."""
+
+    def tick(self, now_ns: int, unix_ns: int, afforded: int, course: Course, /) -> Estimate:
+        burn(40e-3)
+        estimate = super().tick(now_ns, unix_ns, afforded, course)
+        level, reason = course.reached(self.demand, afforded), course.reason(self.demand, afforded)
+        return msgspec.structs.replace(estimate, level=int(level), level_reason=reason)
+
+
+def test_a_loop_that_cannot_afford_the_least_rests_and_says_so(configuration: Configuration) -> None:
+    """40 ms of processor time at 100 Hz with a budget of 4 ms: a tick in ten is done, 40 % of a processor used.
+
+    Nothing is affordable, so the estimator (the real one) would say starved; level and reason tell what was given up.
+    """
+    rig = Rig(configuration, estimator=DearEstimator)
+    rig.run(5)  # the grace
+    used, began = time.process_time(), time.monotonic()
+    rig.loop.run(lambda: rig.loop.ticks >= 35)
+    share = (time.process_time() - used) / (time.monotonic() - began)
+    values = rig.published()
+    rig.close()
+    assert share <= 0.5
+    last = msgspec.json.decode(of(values, "estimate")[-1], type=Estimate)
+    assert last.afforded == 0
+    assert last.level == Level.PREDICTION_ONLY
+    assert "ticks rested" in last.level_reason
+    assert len(of(values, "estimate")) == 35
+
+
+class CuttableEstimator(SmallEstimator):
+    """Weighs ten measurements of 1 ms each, as long as it may."""
+
+    def tick(self, now_ns: int, unix_ns: int, afforded: int, course: Course, /) -> Estimate:
+        course.offered = 10
+        while course.weighed < min(10, course.most) and course.goes_on():
+            burn(1e-3)
+        self.meters.lap("sensing")
+        self.cuts = [*getattr(self, "cuts", []), course.cut]
+        return super().tick(now_ns, unix_ns, afforded, course)
+
+
+def test_a_tick_that_would_overrun_is_cut(configuration: Configuration) -> None:
+    """The first tick knows nothing of 10 ms; the budget of 4 ms cuts it. Later ones are thinned beforehand."""
+    rig = Rig(configuration, estimator=CuttableEstimator)
+    rig.run(150)
+    budget = rig.loop.budget(msgspec.json.decode(of(rig.published(), "estimate")[-1], type=Estimate))
+    cuts = rig.estimator.cuts  # type: ignore[attr-defined]
+    rig.close()
+    assert cuts[0]
+    assert sum(cuts) == budget.cut_ticks < 75
+    assert sum(budget.levels.values()) == budget.ticks == 150
+
+
+def test_memory_is_flat_and_ticks_leave_nothing_behind(rig: Rig) -> None:
+    """Four thousand ticks, with everything that is sent in between: what Python holds afterwards is what it held
+    before but for 16 KiB (counters grow into larger integers), and no tick needs more than 64 KiB on the way.
+    """
+    rig.estimator.health = HealthState.TRACKING
+    rig.estimator.afforded = Forgetful()
+    tick(rig, 1000)
+    tracemalloc.start()
+    try:
+        tick(rig, 500)
+        gc.collect()
+        before, _ = tracemalloc.get_traced_memory()
+        tracemalloc.reset_peak()
+        tick(rig, 4000)
+        gc.collect()
+        after, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert after - before < 16 * 1024
+    assert peak - before < 64 * 1024
+
+
+class Forgetful(list[int]):
+    """A list that does not grow: the test's own memory is not the question."""
+
+    def append(self, value: int, /) -> None:
+        self[:] = [value]
+
+
+def tick(rig: Rig, ticks: int) -> None:
+    for _ in range(ticks):
+        rig.loop.tick(time.monotonic_ns())
+        rig.meters.end(0.0, 0.0)
+        for ends in (rig.estimates, rig.heart):
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    ends.inlet.recv(8192)

@@ -1,0 +1,58 @@
+"""The recording of decisions, on a real queue and a real disk, or one that is always full."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import pytest
+
+from service.channels import Outlet, pair
+from service.decisions import DecisionSender, read
+from service.estimator import Course
+from service.recorder import Recorder
+
+
+def send(sender: DecisionSender, ticks: int) -> None:
+    for tick in range(ticks):
+        sender.send(tick, tick, tick, 300, Course(), [1])
+
+
+def test_a_loop_that_starts_anew_gets_a_new_head(tmp_path: Path) -> None:
+    ends = pair(1 << 16)
+    recorder = Recorder(tmp_path / "log.csv", ["bus"], ends.inlet)
+    sender = DecisionSender(Outlet(ends.outlet), 1)
+    send(sender, 5)
+    send(sender, 3)
+    assert recorder.step(0)
+    assert not recorder.step(0)
+    recorder.close()
+    ends.close()
+    assert len(read(tmp_path / "log.csv")) == 3
+    assert (tmp_path / "log.csv").read_text().count("taken bus") == 2
+
+
+def test_a_full_disk_ends_the_recording_with_one_line(caplog: pytest.LogCaptureFixture) -> None:
+    """What comes afterwards is taken from the queue and thrown away: the loop never meets a full one."""
+    ends = pair(1 << 20)
+    recorder = Recorder(Path("/dev/full"), ["bus"], ends.inlet)
+    sender = DecisionSender(Outlet(ends.outlet), 1)
+    with caplog.at_level(logging.ERROR):
+        for _ in range(5):
+            send(sender, 200)
+            recorder.step(0)
+            recorder.close()
+    assert not recorder.recording
+    assert [record.getMessage() for record in caplog.records] == [
+        "/dev/full: No space left on device; the recording of decisions ends here"
+    ]
+    assert sender.dropped == 0
+    ends.close()
+
+
+def test_a_folder_that_is_not_there_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    ends = pair(1 << 14)
+    recorder = Recorder(tmp_path / "none" / "log.csv", ["bus"], ends.inlet)
+    recorder.step(0)
+    assert "No such file" in caplog.text
+    ends.close()
