@@ -83,7 +83,7 @@ def test_every_figure_is_made_by_the_program() -> None:
 
 def test_the_figures_are_small() -> None:
     """Everyone who clones the repository gets all of them."""
-    assert sum(picture.stat().st_size for picture in PICTURES) < 4_500_000
+    assert sum(picture.stat().st_size for picture in PICTURES) < 4_000_000
 
 
 def test_every_page_of_the_filters_is_in_their_index() -> None:
