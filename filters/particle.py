@@ -11,19 +11,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from filters.belief import STILL, Displacement, Evidence, Moments
+from filters.crew import ALIGNMENT, Blocks, Crew
 from filters.kernels import random, resampling, weights
 from filters.kernels.compile import Float32Array
 from filters.kernels.regularization import shrink
 from filters.motion.model import Motion
 from filters.motion.slow import RandomWalk, diffuse
-from filters.motion.walks import Walks
+from filters.motion.walks import Walk, Walks
 from filters.particle_checks import check_injected, check_shape, check_slow, check_start
 from filters.particle_moments import MomentSums
 from filters.particle_set import ParticleSet
@@ -34,12 +34,14 @@ from filters.sensing.model import Sensor
 Control = TypeVar("Control")
 M = TypeVar("M", bound=tuple[float | None, ...])
 
-EVIDENCE_SAMPLE = 2048
+EVIDENCE_SAMPLE = 1024
 """Most particles that the evidence of a measurement is taken over."""
 
 _RESAMPLING_STREAM = 1 << 32
 _INJECTION_STREAM = 2 << 32
 _KERNEL_STREAM = 3 << 32
+
+_REFUSED = Evidence(math.nan, math.nan, accepted=False)
 
 
 class ParticleFilter(Generic[Control]):
@@ -67,6 +69,8 @@ class ParticleFilter(Generic[Control]):
         Slow states beside those of the motion model, such as a sensor's bias.
     block : int
         Most particles that are moved at once; noise for a block should fit the second-level cache.
+    crew : Crew, optional
+        Threads that help; the result is the same, bit for bit.
 
     Raises
     ------
@@ -83,6 +87,7 @@ class ParticleFilter(Generic[Control]):
         seed: int,
         slow: Sequence[RandomWalk] = (),
         block: int = 32768,
+        crew: Crew | None = None,
     ) -> None:
         names = tuple(motion.names) + tuple(walk.name for walk in slow)
         check_shape(names, capacity, block)
@@ -92,7 +97,6 @@ class ParticleFilter(Generic[Control]):
         """How often every weight was zero and the set was kept with equal weights."""
         self._motion = motion
         self._seed = seed
-        self._block = block
         self._step = 0
         self._draws = 0
         self._particles = ParticleSet(names, capacity)
@@ -101,19 +105,24 @@ class ParticleFilter(Generic[Control]):
         self._ancestors = np.zeros(capacity, np.int32)
         self._centre = ParticleSet(names, 1)
         self._centre.count = 1
-        self._pairs = (motion.noises + 1) // 2
-        rows = max(2 * self._pairs, 2)
-        self._noise: Float32Array = np.zeros((rows, min(block, capacity)), np.float32)
+        self._blocks = Blocks(block, crew)
+        most_blocks = -(-capacity // block)
+        pairs = (motion.noises + 1) // 2
+        rows = max(2 * pairs, 2)
+        self._noises: list[Float32Array] = [
+            np.zeros((rows, min(block + resampling.RUN, capacity)), np.float32)
+            for _ in range(self._blocks.threads)
+        ]
         self._no_noise: Float32Array = np.zeros((rows, 1), np.float32)
-        self._walks = Walks((*motion.walks, *slow), self._particles, seed, self._pairs)
-        self._keys = [random.key(seed, stream) for stream in range(self._pairs)]
-        self._places = np.zeros(capacity, np.int32)
-        self._sample: Float32Array = np.zeros(0, np.float32)
-        self._bounds: list[tuple[int, int]] = []
-        self._sums = np.zeros(2)
-        self._moment_sums = MomentSums(self._particles, self._weights, self._centre)
-        self._log_sum = 0.0
+        self._walks = Walks((*motion.walks, *slow), self._particles, seed, pairs)
+        self._keys = [(random.key(seed, stream), 2 * stream) for stream in range(pairs)]
+        self._sample: Float32Array = np.zeros(min(EVIDENCE_SAMPLE, capacity), np.float32)
+        self._sampled = 0
         self._stride = 1
+        self._sums = np.zeros((most_blocks, 2))
+        self._moment_sums = MomentSums(self._particles, self._weights, self._centre, most_blocks)
+        self._log_sum = 0.0
+        self._total = self._squares = 0.0
         self._centre_values: dict[str, float] = {}
         self._weighed = False
 
@@ -126,7 +135,7 @@ class ParticleFilter(Generic[Control]):
     def effective_sample_size(self) -> float:
         """1 / Σ w², the inverse of the variance that equation 4.36's weights have gathered."""
         self._settle()
-        return float(self._sums[0] ** 2 / self._sums[1])
+        return self._total * self._total / self._squares
 
     def column(self, name: str) -> Float32Array:
         """View of one dimension, (count,) float32; valid until the next :meth:`resample`.
@@ -197,19 +206,27 @@ class ParticleFilter(Generic[Control]):
         self._centre_values.clear()
         self._step += 1
         step = self._step & 0xFFFFFFFF
-        noise = self._noise
         due = self._walks.due(duration)
-        for first, last in self._bounds:
-            for pair, key in enumerate(self._keys):
-                random.normal_pairs(first, last, step, key, noise, 2 * pair)
-            self._motion.move(self._particles, first, last, noise, move)
+        if self._blocks.shared:
+            self._blocks.share(lambda part, first, last: self._move(part, first, last, step, move, due))
+        else:
+            self._move(0, 0, self._blocks.number, step, move, due)
+
+    def _move(
+        self, part: int, first_block: int, last_block: int, step: int, move: object, due: Sequence[Walk]
+    ) -> None:
+        noise, particles = self._noises[part], self._particles
+        for first, last in self._blocks.pairs[first_block:last_block]:
+            for key, row in self._keys:
+                random.normal_pairs.direct(first, last, step, key, noise, row)
+            self._motion.move(particles, first, last, noise, move)
             for walk in due:
-                walk.apply(self._particles, first, last, noise, step)
+                walk.apply(particles, first, last, noise, step)
 
     def weigh(self, sensor: Sensor[M], measurement: M) -> Evidence:
         """Line 5: multiply every weight by the measurement's likelihood.
 
-        The evidence is taken over at most 2,048 particles evenly spaced among all; up to that count it is
+        The evidence is taken over at most 1,024 particles evenly spaced among all; up to that count it is
         exact.
 
         Raises
@@ -217,19 +234,30 @@ class ParticleFilter(Generic[Control]):
         ValueError
             The measurement is not finite; the weights are untouched then.
         """
-        for value in measurement:
-            if value is not None and not math.isfinite(value):
-                raise ValueError(f"{type(sensor).__name__}: a measurement must be finite, got {measurement}")
+        if not all(map(math.isfinite, filter(None, measurement))):
+            raise ValueError(f"{type(sensor).__name__}: a measurement must be finite, got {measurement}")
         if sensor.refusal(measurement) is not None:
-            return Evidence(math.nan, math.nan, accepted=False)
-        innovation = sensor.innovation(self._centre_state(), measurement)
-        constant = sensor.weigh(self._particles, 0, self.count, measurement)
+            return _REFUSED
+        innovation = sensor.innovation(self._centre_values or self._centre_state(), measurement)
+        particles = self._particles
+        if self._blocks.shared:
+            constant = self._share_weighing(sensor, measurement)
+        else:
+            constant = sensor.weigh(particles, 0, particles.count, measurement)
         before = self._log_sum
-        after = weights.log_sum(self._particles.log_weights, self._stride, self._sample)
+        after = weights.log_sum.direct(particles.log_weights, self._sampled, self._stride, self._sample)
         self._log_sum = after
         self._weighed = True
-        log_mean = constant + after - before if after > -math.inf else -math.inf
-        return Evidence(log_mean, innovation, accepted=True)
+        return Evidence(constant + after - before if after > -math.inf else after, innovation, True)
+
+    def _share_weighing(self, sensor: Sensor[M], measurement: M) -> float:
+        constants = [0.0] * self._blocks.threads
+
+        def act(part: int, first: int, last: int) -> None:
+            constants[part] = sensor.weigh(self._particles, first, last, measurement)
+
+        self._blocks.split(self.count, ALIGNMENT, act)
+        return constants[0]
 
     def normalize(self) -> None:
         """Line 6: make weights of the log weights.
@@ -238,17 +266,35 @@ class ParticleFilter(Generic[Control]):
         weights and ``collapses`` counts it; the evidence of the measurement that did it is minus infinity or
         close to it.
         """
-        count = self.count
-        top = float(weights.peak(self._particles.log_weights, 0, count))
-        if not weights.NOTHING < top < math.inf:
+        log_weights, bounds = self._particles.log_weights, self._blocks.bounds
+        if self._blocks.shared:
+            top, total, squares = self._share_normalizing()
+        else:
+            top, total, squares = weights.normalize.direct(log_weights, self._weights, bounds, self._sums)
+        if not total > 0.0:
             self.collapses += 1
             self._level()
             return
-        self._sums.fill(0.0)
-        for first, last in self._bounds:
-            weights.exponentiate(self._particles.log_weights, self._weights, first, last, top, self._sums)
+        self._total, self._squares = total, squares
         self._log_sum -= top
         self._weighed = False
+
+    def _share_normalizing(self) -> tuple[float, float, float]:
+        log_weights, bounds, sums = self._particles.log_weights, self._blocks.bounds, self._sums
+        tops = [-math.inf] * self._blocks.threads
+
+        def find(part: int, first: int, last: int) -> None:
+            tops[part] = weights.peak(log_weights, first, last)
+
+        def exponentiate(part: int, first: int, last: int) -> None:
+            weights.exponentiate(log_weights, self._weights, bounds, first, last, top, sums)
+
+        self._blocks.split(self.count, ALIGNMENT, find)
+        top = max(tops)
+        if not weights.NOTHING < top < math.inf:
+            return top, 0.0, 0.0
+        self._blocks.share(exponentiate)
+        return top, *weights.add(sums, self._blocks.number)
 
     def moments(self, displacement: Displacement | None = None) -> Moments:
         """Weighted mean and covariance, of the particles displaced each along its own heading.
@@ -260,7 +306,7 @@ class ParticleFilter(Generic[Control]):
         self._settle()
         shift = STILL if displacement is None else displacement
         given_path = self._motion.conditional_variances
-        moments = self._moment_sums.moments(shift, self._bounds, given_path, self.effective_sample_size)
+        moments = self._moment_sums.moments(shift, self._blocks, given_path, self.effective_sample_size)
         self._centre_values.clear()
         return moments
 
@@ -286,12 +332,20 @@ class ParticleFilter(Generic[Control]):
         if not 1 <= target <= self.capacity:
             raise ValueError(f"resample: count must lie in 1 to {self.capacity} (the capacity), got {target}")
         uniform = random.uniform(self._seed, _RESAMPLING_STREAM, self._draws + 1)
-        ancestors = scheme(self._weights[: self.count], target, uniform, self._ancestors[:target])
+        source, ancestors = self._weights[: self.count], self._ancestors[:target]
+        if scheme is systematic:  # whose checks these weights do not need
+            resampling.systematic(source, resampling.total(source), uniform, ancestors)
+        else:
+            scheme(source, target, uniform, ancestors)
         self._draws += 1
         self._recount(target)
-        columns = self._particles.columns
-        resampling.deal(columns, self._spare, ancestors, self._places[:target])
-        self._particles.columns, self._spare = self._spare, columns
+        columns, spare, blocks = self._particles.columns, self._spare, self._blocks
+
+        def act(part: int, first: int, last: int) -> None:
+            resampling.deal(columns, spare, ancestors, blocks.bounds, first, last)
+
+        blocks.split(-(-target // resampling.RUN), ALIGNMENT, act)
+        self._particles.columns, self._spare = spare, columns
         self._level()
 
     def inject(
@@ -359,15 +413,15 @@ class ParticleFilter(Generic[Control]):
         self.resample(count, scheme)
         spread = bandwidth * root(covariance)
         step = self._draws & 0xFFFFFFFF
-        for first, last in self._bounds:
+        for first, last in self._blocks.pairs:
             for row, centre in zip(rows, mean, strict=True):
                 shrink(self._particles.columns, row, first, last, centre, factor)
             for axis in range(len(rows)):
                 if axis % 2 == 0:
                     key = random.key(self._seed, _KERNEL_STREAM + axis)
-                    random.normal_pairs(first, last, step, key, self._noise, 0)
+                    random.normal_pairs(first, last, step, key, self._noises[0], 0)
                 for row, sigma in zip(rows, spread[:, axis], strict=True):
-                    diffuse(self._particles.columns, row, first, last, self._noise, axis % 2, sigma)
+                    diffuse(self._particles.columns, row, first, last, self._noises[0], axis % 2, sigma)
 
     def cloud(
         self, count: int, displacement: Displacement | None = None, out: Float32Array | None = None
@@ -392,7 +446,7 @@ class ParticleFilter(Generic[Control]):
         if len(out) < rows:
             raise ValueError(f"cloud: out has {len(out)} rows, {rows} are needed")
         if rows > 0:
-            scale = self.count / (rows * self._sums[0])
+            scale = self.count / (rows * self._total)
             shift = STILL if displacement is None else displacement
             weights.displace(self._particles.columns, self._weights, self.count, scale, *shift, out[:rows])
         return out[:rows]
@@ -406,8 +460,8 @@ class ParticleFilter(Generic[Control]):
         count = self.count
         self._particles.log_weights[:count] = 0.0
         self._weights[:count] = 1.0
-        self._sums[:] = count
-        self._log_sum = math.log(self._sample.size)
+        self._total = self._squares = float(count)
+        self._log_sum = math.log(self._sampled)
         self._weighed = False
 
     def _recount(self, count: int) -> None:
@@ -416,12 +470,8 @@ class ParticleFilter(Generic[Control]):
             return
         self._particles.count = count
         self._stride = -(-count // EVIDENCE_SAMPLE)
-        self._sample = np.empty(count // self._stride, np.float32)
-        blocks = -(-count // self._block)
-        size, rest = divmod(count, blocks)
-        starts = [block * size + min(block, rest) for block in range(blocks)] + [count]
-        self._bounds = list(pairwise(starts))
-        resampling.places(np.array(starts[:-1], np.int64), self._places[:count])
+        self._sampled = count // self._stride
+        self._blocks.divide(count)
 
     def _centre_state(self) -> dict[str, float]:
         """Centre of the belief by name."""

@@ -19,9 +19,9 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol, TypeVar, cast
+from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 import numba
 import numpy as np
@@ -32,16 +32,26 @@ Float32Array = NDArray[np.float32]
 Int32Array = NDArray[np.int32]
 Progress = Callable[[str, int, int], None]
 F = TypeVar("F", bound=Callable[..., Any])
+P = ParamSpec("P")
+R = TypeVar("R")
 
 FUNCTION_FLAGS = frozenset({"nsz", "contract"})
 KERNEL_FLAGS = frozenset({"nsz", "contract", "arcp", "reassoc"})
 INTERPRETED = bool(cast(Any, config).DISABLE_JIT)
 
 
+class Compiled(Protocol):
+    """What of numba's result of a compilation is used here."""
+
+    entry_point: Callable[..., Any]
+
+
 class Dispatcher(Protocol):
     """What of numba's dispatcher is used here."""
 
     py_func: Callable[..., Any]
+    overloads: Mapping[object, Compiled]
+    direct: Callable[..., Any]
 
     def compile(self, sig: str) -> object:
         """Compile one signature, or load it from the cache."""
@@ -49,6 +59,24 @@ class Dispatcher(Protocol):
 
     def disable_compile(self) -> None:
         """Refuse other signatures; convert arguments to the one there is."""
+        ...
+
+
+class Kernel(Protocol[P, R]):
+    """A kernel as its callers see it.
+
+    Attributes
+    ----------
+    direct : callable
+        The same without numba's choice of a signature, which takes as long as the arithmetic of a hundred particles.
+        Nobody looks at the arguments then: the arrays must be of the kernel's types and contiguous. So it is for
+        callers whose arrays are their own, as a particle set's are.
+    """
+
+    direct: Callable[P, R]
+
+    def __call__(self, *arguments: P.args, **named: P.kwargs) -> R:
+        """Call it with arguments of its types; others raise ``TypeError``."""
         ...
 
 
@@ -66,6 +94,7 @@ class Pending:
         if not self._compiled:
             self._dispatcher.compile(self.signature)
             self._dispatcher.disable_compile()
+            self._dispatcher.direct = next(iter(self._dispatcher.overloads.values())).entry_point
             self._compiled = True
 
 
@@ -73,7 +102,7 @@ _kernels: dict[str, Pending] = {}
 _deferring = False
 
 
-def kernel(signature: str, *, exact: bool = False) -> Callable[[F], F]:
+def kernel(signature: str, *, exact: bool = False) -> Callable[[Callable[P, R]], Kernel[P, R]]:
     """Make a kernel of a function over columns.
 
     Parameters
@@ -86,18 +115,19 @@ def kernel(signature: str, *, exact: bool = False) -> Callable[[F], F]:
         oracle's.
     """
     flags = FUNCTION_FLAGS if exact else KERNEL_FLAGS
-    compiler = cast(Callable[..., Callable[[F], Any]], numba.njit)(
+    compiler = cast(Callable[..., Callable[[Callable[P, R]], Any]], numba.njit)(
         fastmath=set(flags), nogil=True, cache=True, error_model="numpy"
     )
 
-    def decorate(python: F) -> F:
+    def decorate(python: Callable[P, R]) -> Kernel[P, R]:
         compiled = compiler(python)
+        compiled.direct = compiled
         if not INTERPRETED:
             name = f"{python.__module__}.{python.__name__}"
             _kernels[name] = Pending(name, signature, cast(Dispatcher, compiled))
             if not _deferring:
                 _kernels[name].compile()
-        return cast(F, compiled)
+        return cast(Kernel[P, R], compiled)
 
     return decorate
 

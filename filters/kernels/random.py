@@ -66,7 +66,7 @@ def normal_pairs(first: int, last: int, step: int, stream_key: int, noise: Float
     """Fill two rows of ``noise`` with standard normals for the particles ``first`` to ``last``.
 
     The radius comes from 31 bits, so tails reach 6.6 sigma; the angle from 32 bits, its half-plane from the
-    third word.
+    third word: the lowest bits of pcg3d's words, which a float32 leaves over, are not random enough.
     """
     one = noise[row]
     other = noise[row + 1]

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy import float64, int64, uint32, uint64
 from numpy.typing import NDArray
 
 from filters.kernels.compile import Float32Array, Int32Array, kernel
+
+RUN = 16
+"""Copies that are laid side by side before the next block has its turn: a cache line of float32."""
+
+_AHEAD = 8
+"""Places that a source writes at once, whether or not all are its own: the next source corrects it."""
 
 
 @kernel("float64(float32[::1])")
@@ -19,60 +26,86 @@ def total(weights: Float32Array) -> float:
 
 @kernel("void(float32[::1], float64, float64, int32[::1])", exact=True)
 def systematic(weights: Float32Array, total: float, uniform: float, ancestors: Int32Array) -> None:
-    """Table 4.4, with the loops the other way round: each source marks where its first copy goes.
+    """Table 4.4, with the loops the other way round: each source writes itself where its copies go.
 
     Source i takes the positions m with c(i-1) < (uniform + m) / count <= c(i), c being the cumulative weight;
-    so the first position after it is floor(c · count - uniform) + 1. A running maximum then fills the gaps.
-    What rounding leaves between the last cumulative weight and the total goes to the last source that has
-    weight.
+    so the first position after it is floor(c · count - uniform) + 1. How many copies a source has cannot be
+    predicted, so each writes eight, which is one instruction, and its successor overwrites what is too much; only a
+    source with more copies takes a branch. What rounding leaves between the last cumulative weight and the total
+    goes to the last source that has weight.
     """
     count = ancestors.size
-    for m in range(count):
-        ancestors[m] = 0
     scale = count / total
+    shift = 1.0 - uniform
     cumulative = 0.0
-    end = 0
-    for i in range(weights.size):
-        if end < count:  # a source without a copy is overwritten by the next
-            ancestors[np.uint64(end)] = i
-        cumulative += np.float64(weights[i])
-        end = min(count, int(cumulative * scale + 1.0 - uniform))
-    if end < count:
+    start = int64(0)
+    i = int64(0)
+    while i < weights.size and start <= count - _AHEAD:
+        cumulative += float64(weights[uint64(i)])
+        end = min(count, int64(cumulative * scale + shift))
+        for k in range(_AHEAD):
+            ancestors[uint64(start + k)] = i
+        for m in range(start + _AHEAD, end):
+            ancestors[uint64(m)] = i
+        start = end
+        i += 1
+    while i < weights.size and start < count:
+        cumulative += float64(weights[uint64(i)])
+        end = min(count, int64(cumulative * scale + shift))
+        for m in range(start, end):
+            ancestors[m] = i
+        start = end
+        i += 1
+    if start < count:
         i = weights.size - 1
         while weights[i] <= 0.0:
             i -= 1
-        ancestors[end] = i
-    latest = np.int32(0)
-    for m in range(count):
-        ahead = np.int32(ancestors[m] - latest)  # a maximum without a branch, which none could predict
-        latest = np.int32(latest + np.int32(ahead & ~np.int32(ahead >> np.int32(31))))
-        ancestors[m] = latest
+        for m in range(start, count):
+            ancestors[m] = i
 
 
-@kernel("void(int64[::1], int32[::1])", exact=True)
-def places(starts: NDArray[np.int64], places: Int32Array) -> None:
-    """Say where each copy is laid: dealt to the blocks in turn, like cards, so that each gets a fair sample.
+@kernel("void(float32[:, ::1], float32[:, ::1], int32[::1], int64[::1], int64, int64)", exact=True)
+def deal(
+    source: Float32Array,
+    target: Float32Array,
+    ancestors: Int32Array,
+    bounds: NDArray[np.int64],
+    first_run: int,
+    last_run: int,
+) -> None:
+    """Copy ancestors to their places: runs of copies are dealt to the blocks in turn, like cards.
 
-    Ancestors ascend; laid down in a row, the first block would hold only the first ancestors' copies.
-    ``starts`` are the blocks' first places; earlier blocks may be larger by one.
+    Ancestors ascend; laid down in a row, the first block would hold only the first ancestors' copies. So each block
+    gets a fair sample. Only the last run of all may be shorter than the others.
     """
-    blocks = starts.size
-    rounds = places.size // blocks
-    m = 0
-    for position in range(rounds):
-        for block in range(blocks):
-            places[m] = starts[block] + position
-            m += 1
-    for block in range(places.size - m):
-        places[m] = starts[block] + rounds
-        m += 1
-
-
-@kernel("void(float32[:, ::1], float32[:, ::1], int32[::1], int32[::1])", exact=True)
-def deal(source: Float32Array, target: Float32Array, ancestors: Int32Array, places: Int32Array) -> None:
-    """Copy every column's ancestors to their places."""
+    blocks = bounds.size - 1
     for row in range(source.shape[0]):
         old = source[row]
         new = target[row]
-        for m in range(ancestors.size):
-            new[np.uint32(places[m])] = old[np.uint32(ancestors[m])]
+        block = first_run % blocks
+        position = first_run // blocks * RUN
+        for run in range(first_run, last_run):
+            first = run * RUN
+            place = bounds[uint64(block)] + position
+            if first + RUN <= ancestors.size:
+                for k in range(RUN):
+                    new[uint64(place + k)] = old[uint32(ancestors[uint64(first + k)])]
+            else:
+                for k in range(ancestors.size - first):
+                    new[uint64(place + k)] = old[uint32(ancestors[uint64(first + k)])]
+            block += 1
+            if block == blocks:
+                block = 0
+                position += RUN
+
+
+def block_sizes(count: int, largest: int) -> list[int]:
+    """Sizes of as few blocks as possible, none larger than ``largest`` by a run or more, all of nearly one size.
+
+    ``deal`` gives run r to block r modulo the number of blocks, so the sizes follow from it.
+    """
+    number = -(-count // largest)
+    runs, rest = divmod(-(-count // RUN), number)
+    sizes = [RUN * (runs + (block < rest)) for block in range(number)]
+    sizes[rest - 1] -= -count % RUN  # the last run of all may be short
+    return sizes

@@ -148,21 +148,23 @@ class Unicycle:
     def noise_variances(self, control: UnicycleControl, duration: float) -> tuple[float, float]:
         """Return the variances of the distance (m²) and of the turn (rad²) that a control leaves open: R and Q."""
         distance, turn, distance_sigma, turn_sigma = control
+        speed, slip, yaw, turned = self.speed_noise, self.slip_noise, self.yaw_rate_noise, self.turn_noise
         return (
-            self.speed_noise**2 * duration + self.slip_noise**2 * abs(distance) + distance_sigma**2,
-            self.yaw_rate_noise**2 * duration + self.turn_noise**2 * abs(turn) + turn_sigma**2,
+            speed * speed * duration + slip * slip * abs(distance) + distance_sigma * distance_sigma,
+            yaw * yaw * duration + turned * turned * abs(turn) + turn_sigma * turn_sigma,
         )
 
     def begin(self, control: UnicycleControl, duration: float) -> UnicycleStep:
         """Prepare one prediction and update the shared variances; see :class:`filters.motion.Motion`."""
         if not all(map(math.isfinite, control)):
             raise ValueError(f"unicycle: every number of the control must be finite, got {control}")
-        distance, turn = control.distance, control.turn
+        distance, turn, _, _ = control
+        bias_walk, scale_walk = self.gyro_bias_walk, self.odometry_scale_walk
         distance_variance, turn_variance = self.noise_variances(control, duration)
-        bias_variance = self._bias_variance + self.gyro_bias_walk**2 * duration
-        scale_variance = self._scale_variance + self.odometry_scale_walk**2 * duration
-        turn_total = turn_variance + duration**2 * bias_variance
-        distance_total = distance_variance + distance**2 * scale_variance
+        bias_variance = self._bias_variance + bias_walk * bias_walk * duration
+        scale_variance = self._scale_variance + scale_walk * scale_walk * duration
+        turn_total = turn_variance + duration * duration * bias_variance
+        distance_total = distance_variance + distance * distance * scale_variance
         turn_sigma, distance_sigma = math.sqrt(turn_total), math.sqrt(distance_total)
         if turn_total > 0.0:
             self._bias_variance = bias_variance * turn_variance / turn_total
@@ -182,7 +184,7 @@ class Unicycle:
         self, particles: ParticleSet, first: int, last: int, noise: Float32Array, step: UnicycleStep
     ) -> None:
         """Move a block of particles in place; see :class:`filters.motion.Motion`."""
-        roll(particles.columns, noise, first, last, *step)
+        roll.direct(particles.columns, noise, first, last, *step)
 
 
 @kernel(

@@ -71,7 +71,7 @@ class Heading:
         sigma = self.sigma if measurement.sigma is None else measurement.sigma
         mixed = mixture(self.outliers, -math.log(sigma) - _LOG_SQRT_TWO_PI, -math.log(_CIRCLE))
         bias_row, bias_slope = (0, 0.0) if self.bias is None else (particles.row(self.bias), 1.0)
-        compass(
+        compass.direct(
             particles.columns,
             particles.log_weights,
             first,

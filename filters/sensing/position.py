@@ -86,7 +86,7 @@ class Position:
         sigma_north, sigma_east = self._sigmas(measurement)
         log_density = -_LOG_TWO_PI - math.log(sigma_north) - math.log(sigma_east)
         mixed = mixture(self.outliers, log_density, -2.0 * math.log(self.span))
-        fix(
+        fix.direct(
             particles.columns,
             particles.log_weights,
             first,

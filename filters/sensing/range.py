@@ -100,12 +100,12 @@ class Range:
         gain = math.sqrt(0.5) / sigma
         columns, log_weights = particles.columns, particles.log_weights
         if self.outliers == 0.0 and self.scale is None and self.bias is None:
-            gaussian(columns, log_weights, first, last, north, east, down * down, distance, gain)
+            gaussian.direct(columns, log_weights, first, last, north, east, down * down, distance, gain)
             return log_density
         mixed = mixture(self.outliers, log_density, -math.log(self.span))
         scale_row, scale_slope = (0, 0.0) if self.scale is None else (particles.row(self.scale), 1.0)
         bias_row, bias_slope = (0, 0.0) if self.bias is None else (particles.row(self.bias), 1.0)
-        robust(
+        robust.direct(
             columns,
             log_weights,
             first,

@@ -84,7 +84,7 @@ class Velocity:
         log_density = -_LOG_TWO_PI - 2.0 * math.log(sigma)
         mixed = mixture(self.outliers, log_density, -2.0 * math.log(self.span))
         scale_row, scale_slope = (0, 0.0) if self.scale is None else (particles.row(self.scale), 1.0)
-        course(
+        course.direct(
             particles.columns,
             particles.log_weights,
             first,

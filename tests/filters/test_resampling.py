@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filters.kernels import resampling as kernels
-from filters.kernels.resampling import places
 from filters.resampling import systematic
 
 weight_lists = st.lists(
@@ -142,14 +141,24 @@ def test_what_cannot_be_resampled_is_refused(
         systematic(np.array(weights, np.float32), count, uniform)
 
 
-@given(st.integers(1, 500), st.integers(1, 20))
+@given(st.integers(1, 2000), st.integers(1, 700), st.integers(0, 5))
 @settings(deadline=None)
-def test_places_are_a_deal(count: int, blocks: int) -> None:
-    blocks = min(blocks, count)
-    size, rest = divmod(count, blocks)
-    starts = np.array([b * size + min(b, rest) for b in range(blocks)], np.int64)
-    dealt = np.zeros(count, np.int32)
-    places(starts, dealt)
-    assert sorted(dealt.tolist()) == list(range(count))
-    block_of = np.searchsorted(starts, dealt, side="right") - 1
-    assert block_of.tolist() == [m % blocks for m in range(count)]
+def test_copies_are_dealt_to_the_blocks(count: int, largest: int, seed: int) -> None:
+    """Run r of 16 copies goes to block r modulo the number of blocks, whoever deals it."""
+    sizes = kernels.block_sizes(count, largest)
+    assert sum(sizes) == count
+    assert min(sizes) >= 0
+    assert max(sizes) < largest + kernels.RUN
+    rng = np.random.default_rng(seed)
+    source = rng.normal(size=(3, 50)).astype(np.float32)
+    ancestors = np.sort(rng.integers(0, 50, count)).astype(np.int32)
+    bounds = np.cumsum([0, *sizes])
+    runs = -(-count // kernels.RUN)
+    target = np.zeros((3, count), np.float32)
+    middle = int(rng.integers(0, runs + 1))
+    kernels.deal(source, target, ancestors, bounds, middle, runs)
+    kernels.deal(source, target, ancestors, bounds, 0, middle)
+    hands: list[list[int]] = [[] for _ in sizes]
+    for run in range(runs):
+        hands[run % len(sizes)] += ancestors[run * kernels.RUN : (run + 1) * kernels.RUN].tolist()
+    assert np.array_equal(target, source[:, [i for hand in hands for i in hand]])

@@ -1,0 +1,102 @@
+"""Who does the work on a particle set's blocks: one thread, or several that the caller lends.
+
+A filter starts no thread. It divides its particles into blocks that do not depend on who works on them, takes its
+random numbers from counters, and adds the blocks' sums in order; so a crew makes it faster and changes no bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filters.kernels.resampling import block_sizes
+
+ALIGNMENT = 256
+"""Particles: a division elsewhere could put one into a loop's remainder that was in its vector part."""
+
+SHARED_FROM = 50_000
+"""Particles below which a crew's coming and going costs more than it helps."""
+
+
+class Crew(Protocol):
+    """The named requirement of a crew of threads.
+
+    Attributes
+    ----------
+    threads : int
+        How many work, the caller's among them.
+    """
+
+    @property
+    def threads(self) -> int:
+        """How many work, the caller's among them."""
+        ...
+
+    def run(self, task: Callable[[int], None]) -> None:
+        """Call ``task`` with every number below ``threads``, each on a thread of its own; return when all are done.
+
+        Raises
+        ------
+        Exception
+            What a task raised.
+        """
+        ...
+
+
+class Blocks:
+    """The division of a particle set into blocks.
+
+    Parameters
+    ----------
+    largest : int
+        Most particles of a block.
+    crew : Crew, optional
+        Who works on them; without one the caller's thread does all.
+
+    Attributes
+    ----------
+    bounds : (number + 1,) int64
+        Block b lies from ``bounds[b]`` to ``bounds[b + 1]``.
+    pairs : list of (int, int)
+        The same as plain numbers.
+    """
+
+    def __init__(self, largest: int, crew: Crew | None = None) -> None:
+        self._largest = largest
+        self._crew = crew
+        self.bounds: NDArray[np.int64] = np.zeros(1, np.int64)
+        self.pairs: list[tuple[int, int]] = []
+        self.shared = False
+
+    def divide(self, count: int) -> None:
+        """Divide ``count`` particles."""
+        ends = np.cumsum([0, *block_sizes(count, self._largest)])
+        self.bounds = ends.astype(np.int64)
+        self.pairs = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
+        self.shared = self._crew is not None and count >= SHARED_FROM and self.number >= self._crew.threads
+
+    @property
+    def number(self) -> int:
+        """How many there are."""
+        return len(self.pairs)
+
+    @property
+    def threads(self) -> int:
+        """How many threads there are to share the work."""
+        return 1 if self._crew is None else self._crew.threads
+
+    def share(self, task: Callable[[int, int, int], None]) -> None:
+        """Call ``task(part, first_block, last_block)`` for contiguous parts of the blocks."""
+        self.split(self.number, 1, task)
+
+    def split(self, size: int, grain: int, task: Callable[[int, int, int], None]) -> None:
+        """Call ``task(part, first, last)`` for contiguous parts of 0 to ``size``, divided at multiples of ``grain``."""
+        if self._crew is None or not self.shared:
+            task(0, 0, size)
+            return
+        threads = self._crew.threads
+        ends = [size * part // threads // grain * grain for part in range(threads)] + [size]
+        self._crew.run(lambda part: task(part, ends[part], ends[part + 1]))
