@@ -1,206 +1,152 @@
-"""The full step of the filter, timed: nanoseconds of CPU per particle beside a plain numpy float64 version.
+"""The full step of the filter, timed in one interleaved run beside C by hand and plain numpy float64.
 
-    python benchmarks/step.py [--counts 1000,10000,100000,1000000] [--outliers 0.0] [--block 32768] [--stages]
+    python benchmarks/step.py [--counts 1000,10000,100000,1000000] [--block 16384] [--models] [--json FILE]
 
-The workload "rover-beacons": a unicycle drives figures of eight between four beacons, 50 steps a second;
-motion with noise on distance and turn, four ranges, normalise, effective sample size, mean and covariance,
-systematic resampling below half the count. Blended over the steps that resample and those that do not;
-medians of CPU time, one thread.
+Blended over the steps that resample and those that do not. Every round times some steps of each program in turn, so
+a machine that is busy is busy for all; the table gives the median round, its spread over the rounds (10th to 90th
+percentile), and the ratios within rounds. Processor time; with --threads 2 wall time, for both.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
+import platform
 import statistics
+import sys
 import time
-from collections import defaultdict
 from collections.abc import Callable
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from service import kernels
 
 kernels.prepare()  # numba's own cache would not notice a change in a function that was inlined
 
-from filters.motion import Unicycle, UnicycleControl  # noqa: E402
-from filters.particle import ParticleFilter  # noqa: E402
-from filters.sensing import Range, RangeMeasurement  # noqa: E402
+import models  # noqa: E402
+import workload  # noqa: E402
 
-DURATION = 0.02
-SPEED, RADIUS = 3.0, 8.5
-SPEED_SIGMA, YAW_RATE_SIGMA, HEADING_SIGMA, RANGE_SIGMA = 0.5, 0.2, 0.005, 0.3
-TURN_SIGMA = math.hypot(YAW_RATE_SIGMA * DURATION, HEADING_SIGMA)
-BEACONS = ((2.0, 2.0), (48.0, 4.0), (46.0, 47.0), (3.0, 45.0))
-SPREAD = (0.5, 0.5, 0.1)
-START = (25.0, 25.0, 0.0)
-STEPS = {1_000: 1000, 10_000: 300, 100_000: 80, 1_000_000: 20}
+from service.crew import Threads  # noqa: E402
 
-Step = Callable[["Tick"], tuple[float, float]]
+ROUNDS = 12
+STEPS = {1_000: 100, 10_000: 40, 100_000: 20, 1_000_000: 6}
+"""Steps of a round; numpy does a quarter of them."""
 
+WARM = 2
+"""Rounds that are not counted."""
 
-class Tick(NamedTuple):
-    """One step of the trajectory."""
-
-    distance: float
-    turn: float
-    ranges: tuple[float, ...]
-    truth: tuple[float, float]
+Makers = dict[str, Callable[[], workload.Step]]
 
 
-def trajectory(steps: int) -> list[Tick]:
-    rng = np.random.default_rng(20261104)
-    rate = SPEED / RADIUS
-    lap = round(2.0 * math.pi / rate / DURATION)
-    north, east, heading = START
-    ticks: list[Tick] = []
-    for k in range(steps):
-        distance = SPEED * DURATION
-        turn = (rate if (k // lap) % 2 == 0 else -rate) * DURATION
-        rolled = distance + SPEED_SIGMA * DURATION * rng.standard_normal()
-        north += rolled * math.cos(heading)
-        east += rolled * math.sin(heading)
-        heading += turn + TURN_SIGMA * rng.standard_normal()
-        ranges = tuple(
-            math.hypot(n - north, e - east) + RANGE_SIGMA * rng.standard_normal() for n, e in BEACONS
-        )
-        ticks.append(Tick(distance, turn, ranges, (north, east)))
-    return ticks
+def rounds(makers: Makers, count: int) -> dict[str, dict[str, Any]]:
+    """Return for each program the costs of its rounds, nanoseconds per step, and its error."""
+    each = STEPS.get(count, 20)
+    ticks = workload.trajectory(each * (ROUNDS + WARM))
+    programs = {name: make() for name, make in makers.items()}
+    costs: dict[str, list[float]] = {name: [] for name in programs}
+    squares: dict[str, list[float]] = {name: [] for name in programs}
+    for first in range(0, len(ticks), each):
+        for name, step in programs.items():
+            spent: list[float] = []
+            for tick in ticks[first : first + each]:
+                north, east, cost = step(tick)
+                spent.append(cost)
+                squares[name].append((north - tick.truth[0]) ** 2 + (east - tick.truth[1]) ** 2)
+            costs[name].append(statistics.fmean(spent))
+    return {
+        name: {"costs": costs[name][WARM:], "rmse": math.sqrt(statistics.fmean(squares[name]))}
+        for name in programs
+    }
 
 
-def start(count: int, seed: int) -> NDArray[np.float64]:
-    return np.array(START)[:, None] + np.array(SPREAD)[:, None] * np.random.default_rng(seed).standard_normal(
-        (3, count)
-    )
+def low_high(values: list[float]) -> tuple[float, float]:
+    low, high = np.quantile(values, (0.1, 0.9))
+    return float(low), float(high)
 
 
-def columns_filter(
-    count: int, outliers: float, block: int, lap: Callable[[str], None] = lambda stage: None
-) -> Step:
-    """Make the step through the public face of the filter."""
-    motion = Unicycle(SPEED_SIGMA * math.sqrt(DURATION), TURN_SIGMA / math.sqrt(DURATION), 0.0, 0.0)
-    belief = ParticleFilter(motion, capacity=count, seed=1, block=block)
-    north, east, heading = start(count, 1)
-    belief.initialize(
-        {
-            "north": north,
-            "east": east,
-            "heading": heading,
-            "gyro_bias": np.zeros(count),
-            "odometry_scale": np.ones(count),
+def compare(count: int, block: int, library: Any) -> dict[str, Any]:
+    makers: Makers = {"beliefd": lambda: workload.product(count, block)}
+    if library is not None:
+        makers["limit.c"] = lambda: workload.by_hand(library, count)
+    makers["numpy"] = lambda: workload.plain_numpy(count)
+    result: dict[str, Any] = {"count": count}
+    measured = rounds(makers, count)
+    for name, values in measured.items():
+        ours = measured["beliefd"]["costs"]
+        ratios = [cost / own for cost, own in zip(values["costs"], ours, strict=True)]
+        low, high = low_high(values["costs"])
+        result[name] = {
+            "us_per_step": statistics.median(values["costs"]) / 1e3,
+            "us_low": low / 1e3,
+            "us_high": high / 1e3,
+            "ns_per_particle": statistics.median(values["costs"]) / count,
+            "times_beliefd": statistics.median(ratios),
+            "rmse_m": values["rmse"],
         }
-    )
-    sensor = Range(RANGE_SIGMA, outliers=outliers)
-
-    def step(tick: Tick) -> tuple[float, float]:
-        lap("")
-        belief.predict(UnicycleControl(tick.distance, tick.turn), DURATION)
-        lap("predict")
-        for distance, (n, e) in zip(tick.ranges, BEACONS, strict=True):
-            belief.weigh(sensor, RangeMeasurement(distance, n, e))
-        lap("weigh")
-        belief.normalize()
-        lap("normalize")
-        moments = belief.moments()
-        lap("moments")
-        if belief.effective_sample_size < count / 2:
-            belief.resample()
-        lap("resample")
-        return float(moments.mean[0]), float(moments.mean[1])
-
-    return step
+    return result
 
 
-def plain_numpy(count: int) -> Step:
-    """Make the step as one would write it in numpy, float64."""
-    rng = np.random.default_rng(1)
-    state = start(count, 1)
-    log_weights = np.zeros(count)
-    order = np.arange(count)
-
-    def step(tick: Tick) -> tuple[float, float]:
-        nonlocal state, log_weights
-        noise = rng.standard_normal((2, count))
-        rolled = tick.distance + SPEED_SIGMA * DURATION * noise[0]
-        state[0] += rolled * np.cos(state[2])
-        state[1] += rolled * np.sin(state[2])
-        state[2] += tick.turn + TURN_SIGMA * noise[1]
-        for distance, (n, e) in zip(tick.ranges, BEACONS, strict=True):
-            residual = np.sqrt((state[0] - n) ** 2 + (state[1] - e) ** 2) - distance
-            log_weights -= 0.5 / RANGE_SIGMA**2 * residual * residual
-        weights = np.exp(log_weights - log_weights.max())
-        weights /= weights.sum()
-        north, east = weights @ state[0], weights @ state[1]
-        heading = math.atan2(weights @ np.sin(state[2]), weights @ np.cos(state[2]))
-        turned = (state[2] - heading + np.pi) % (2 * np.pi) - np.pi
-        offsets = np.stack([state[0] - north, state[1] - east, turned])
-        _ = (offsets * weights) @ offsets.T
-        if 1.0 / np.sum(weights * weights) < count / 2:
-            cumulative = np.cumsum(weights)
-            cumulative[-1] = 1.0
-            state = state[:, np.searchsorted(cumulative, (order + rng.random()) / count)]
-            log_weights = np.zeros(count)
-        else:
-            log_weights -= log_weights.max()
-        return north, east
-
-    return step
-
-
-def timed(step: Step, ticks: list[Tick]) -> tuple[float, float]:
-    """Return the mean CPU time of a step without its slowest tenth, and the error in position (RMS)."""
-    costs: list[float] = []
-    squares: list[float] = []
-    for tick in ticks:
-        before = time.process_time_ns()
-        north, east = step(tick)
-        costs.append(time.process_time_ns() - before)
-        squares.append((north - tick.truth[0]) ** 2 + (east - tick.truth[1]) ** 2)
-    settled = sorted(costs[len(costs) // 10 :])
-    return statistics.fmean(settled[: len(settled) * 9 // 10]), math.sqrt(statistics.fmean(squares))
-
-
-def stages(count: int, outliers: float, block: int, ticks: list[Tick]) -> dict[str, float]:
-    """Return the median wall time of each stage, nanoseconds per particle."""
-    laps: dict[str, list[int]] = defaultdict(list)
-    latest = 0
-
-    def lap(stage: str) -> None:
-        nonlocal latest
-        now = time.perf_counter_ns()
-        laps[stage].append(now - latest)
-        latest = time.perf_counter_ns()
-
-    step = columns_filter(count, outliers, block, lap)
-    for tick in ticks:
-        step(tick)
-    medians = {stage: statistics.median(times) / count for stage, times in laps.items() if stage}
-    resampled = [nanoseconds for nanoseconds in laps["resample"] if nanoseconds > 0.5 * count]
-    medians["resample"] = statistics.median(resampled) / count if resampled else math.nan
-    return medians
+def speed_up(count: int, block: int, threads: int) -> dict[str, float]:
+    """Return the wall time of a step with one thread over that with several."""
+    crew = Threads(threads)
+    makers: Makers = {
+        "one": lambda: workload.product(count, block, None, time.perf_counter_ns),
+        "crew": lambda: workload.product(count, block, crew, time.perf_counter_ns),
+    }
+    measured = rounds(makers, count)
+    crew.close()
+    ratios = [a / b for a, b in zip(measured["one"]["costs"], measured["crew"]["costs"], strict=True)]
+    return {"count": count, "threads": threads, "speed_up": statistics.median(ratios)}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--counts", default="1000,10000,100000,1000000")
-    parser.add_argument("--outliers", type=float, default=0.0)
-    parser.add_argument("--block", type=int, default=32768)
-    parser.add_argument("--stages", action="store_true")
+    parser.add_argument("--block", type=int, default=16384)
+    parser.add_argument("--models", action="store_true", help="every model and stage by itself")
+    parser.add_argument("--threads", type=int, default=1, help="how much faster so many threads are")
+    parser.add_argument("--json", type=Path, help="write the figures here")
     arguments = parser.parse_args()
-    print(f"{'particles':>9} {'µs/step':>9} {'ns/particle':>11} {'numpy ns':>9} {'ratio':>6}  RMSE m (numpy)")
-    for count in (int(text) for text in arguments.counts.split(",")):
-        ticks = trajectory(STEPS.get(count, 100))
-        cost, error = timed(columns_filter(count, arguments.outliers, arguments.block), ticks)
-        plain, plain_error = timed(plain_numpy(count), ticks[: max(12, len(ticks) // 4)])
-        print(
-            f"{count:9d} {cost / 1e3:9.1f} {cost / count:11.2f} {plain / count:9.1f} {plain / cost:6.1f}  "
-            f"{error:.3f} ({plain_error:.3f})"
-        )
-        if arguments.stages:
-            for stage, each in stages(count, arguments.outliers, arguments.block, ticks).items():
-                print(f"{'':9} {stage:>10} {each:8.2f} ns/particle")
+    library = workload.build()
+    name = workload.compiler()
+    print(
+        f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, limit.c by {name}"
+    )
+    if library is not None and name is not None and not name.startswith("clang"):
+        print(f"{name} leaves limit.c's loops scalar: its ratio flatters; install clang")
+    counts = [int(text) for text in arguments.counts.split(",")]
+    report: dict[str, Any] = {"compiler": name, "block": arguments.block, "steps": []}
+    print(
+        f"\n{'particles':>9} {'program':>8} {'µs/step':>9} {'10 to 90 %':>17} {'ns/particle':>11} {'ratio':>6}  RMSE m"
+    )
+    for count in counts:
+        row = compare(count, arguments.block, library)
+        report["steps"].append(row)
+        for program in ("beliefd", "limit.c", "numpy"):
+            if program in row:
+                p = row[program]
+                print(
+                    f"{count:9d} {program:>8} {p['us_per_step']:9.1f} {p['us_low']:8.1f} {p['us_high']:8.1f} "
+                    f"{p['ns_per_particle']:11.2f} {p['times_beliefd']:6.2f}  {p['rmse_m']:.3f}"
+                )
+    if arguments.models:
+        report["models"] = {count: models.table(count, arguments.block) for count in (10_000, 100_000)}
+        print(f"\n{'ns per particle':30} {'at 10,000':>10} {'at 100,000':>10}")
+        for model, few in report["models"][10_000].items():
+            print(f"{model:30} {few:10.2f} {report['models'][100_000][model]:10.2f}")
+    if arguments.threads > 1:
+        report["threads"] = [
+            speed_up(count, arguments.block, arguments.threads) for count in counts if count >= 100_000
+        ]
+        for row in report["threads"]:
+            print(f"{row['count']} particles, {row['threads']} threads: {row['speed_up']:.2f} times as fast")
+    if arguments.json:
+        arguments.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -17,9 +17,6 @@ from filters.kernels.resampling import block_sizes
 ALIGNMENT = 256
 """Particles: a division elsewhere could put one into a loop's remainder that was in its vector part."""
 
-SHARED_FROM = 50_000
-"""Particles below which a crew's coming and going costs more than it helps."""
-
 
 class Crew(Protocol):
     """The named requirement of a crew of threads.
@@ -28,11 +25,18 @@ class Crew(Protocol):
     ----------
     threads : int
         How many work, the caller's among them.
+    fewest : int
+        Particles below which its coming and going costs more than it helps: the filter works alone then.
     """
 
     @property
     def threads(self) -> int:
         """How many work, the caller's among them."""
+        ...
+
+    @property
+    def fewest(self) -> int:
+        """Particles from which it is worth calling."""
         ...
 
     def run(self, task: Callable[[int], None]) -> None:
@@ -76,7 +80,9 @@ class Blocks:
         ends = np.cumsum([0, *block_sizes(count, self._largest)])
         self.bounds = ends.astype(np.int64)
         self.pairs = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
-        self.shared = self._crew is not None and count >= SHARED_FROM and self.number >= self._crew.threads
+        self.shared = self._crew is not None and count >= max(
+            self._crew.fewest, self._crew.threads * ALIGNMENT
+        )
 
     @property
     def number(self) -> int:

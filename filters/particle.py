@@ -86,7 +86,7 @@ class ParticleFilter(Generic[Control]):
         capacity: int,
         seed: int,
         slow: Sequence[RandomWalk] = (),
-        block: int = 32768,
+        block: int = 16384,
         crew: Crew | None = None,
     ) -> None:
         names = tuple(motion.names) + tuple(walk.name for walk in slow)
@@ -151,6 +151,16 @@ class ParticleFilter(Generic[Control]):
     def columns(self) -> Float32Array:
         """View of all dimensions, (dimension, capacity) float32; the first ``count`` are particles."""
         return self._particles.columns
+
+    @property
+    def particles(self) -> ParticleSet:
+        """The set as motion and sensor models see it; for those who time them by themselves."""
+        return self._particles
+
+    @property
+    def blocks(self) -> list[tuple[int, int]]:
+        """First and last of the blocks that the particles are divided into."""
+        return self._blocks.pairs
 
     @property
     def weights(self) -> Float32Array:

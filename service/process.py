@@ -15,14 +15,17 @@ import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from service import kernels
 from service.channels import Heart, Outlet, inherited
-from service.config import Configuration
+from service.config import Budget, Configuration
 from service.journal import write_log
 from service.realtime import die_with_parent, freeze_garbage, punctual
 from service.wiring import configuration_from
+
+if TYPE_CHECKING:
+    from service.crew import Threads
 
 _log = logging.getLogger(__name__)
 
@@ -95,13 +98,16 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
     heart.announce("rehearsing")
     shapes = rehearse(configuration)
     meters = Meters(configuration.loop.rate)
+    for refusal in punctual(configuration.loop.priority, configuration.loop.cpus):
+        _log.warning("loop: %s", refusal)
+    crew = _crew(configuration.budget)  # after that: its threads inherit the priority
     links = [argument.rpartition("=") for argument in arguments.link]
     decisions = None
     if arguments.decisions is not None:
         decisions = DecisionSender(Outlet(inherited(arguments.decisions)), len(links))
     loop = Loop(
         configuration,
-        Estimator(configuration, meters),
+        Estimator(configuration, meters, crew=crew),
         meters,
         [Inlet(name, inherited(int(descriptor))) for name, _, descriptor in links],
         Outlet(inherited(arguments.publisher)),
@@ -110,11 +116,23 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
         decisions,
     )
     stopped = _stop_flag()
-    for refusal in punctual(configuration.loop.priority, configuration.loop.cpus):
-        _log.warning("loop: %s", refusal)
     freeze_garbage()
     loop.run(stopped)
     _log.info("loop: %s", loop.summary())
+
+
+def _crew(budget: Budget) -> Threads | None:
+    """Hire the threads that the configuration allows, if they are worth it; one is no crew, and none is started."""
+    if budget.threads == 1:
+        return None
+    from service.crew import hired
+
+    crew = hired(budget.threads, budget.particles_max)
+    if crew is None:
+        _log.info("loop: %d threads are no faster than one here; one works", budget.threads)
+    else:
+        _log.info("loop: %d threads share the work from %d particles", budget.threads, crew.fewest)
+    return crew
 
 
 def _stop_flag() -> Callable[[], bool]:

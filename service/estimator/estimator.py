@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from drivers.plausibility import implausible
 from drivers.sample import GeodeticPosition, LocalPosition, Origin, Sample
 from filters.belief import Belief
+from filters.crew import Crew
 from filters.kld import Demand
 from filters.particle import ParticleFilter
 from filters.policy import EffectiveShare, Policy, Wear
@@ -98,10 +99,16 @@ class Estimator:
         What the stages of a tick are charged to.
     seed : int
         Of the random numbers: same samples, counts and seed, same bytes.
+    crew : Crew, optional
+        Threads that help with the particles; they change no byte.
     """
 
     def __init__(
-        self, configuration: Configuration, stopwatch: Stopwatch | None = None, seed: int = 0
+        self,
+        configuration: Configuration,
+        stopwatch: Stopwatch | None = None,
+        seed: int = 0,
+        crew: Crew | None = None,
     ) -> None:
         self.configuration = configuration
         self.seed = seed
@@ -118,6 +125,7 @@ class Estimator:
             capacity=configuration.budget.particles_max,
             seed=seed,
             slow=self._vehicle.slow_states,
+            crew=crew,
         )
         self._demand_of = Demand(
             POSITION_BIN,
