@@ -37,7 +37,7 @@ format: $(INSTALLED) ## let ruff rewrite the sources
 	$(BIN)/ruff format .
 
 bench: install ## what this machine affords, and how the loop keeps its deadlines
-	$(BIN)/python benchmarks/step.py
+	$(BIN)/python benchmarks/step.py --models
 	$(BIN)/python benchmarks/deadline.py
 
 system: install ## the daemon under real systemd with a real vcan0, in a guest

@@ -34,7 +34,7 @@ from filters.sensing.model import Sensor
 Control = TypeVar("Control")
 M = TypeVar("M", bound=tuple[float | None, ...])
 
-EVIDENCE_SAMPLE = 1024
+EVIDENCE_SAMPLE = 2048
 """Most particles that the evidence of a measurement is taken over."""
 
 _RESAMPLING_STREAM = 1 << 32
@@ -236,7 +236,7 @@ class ParticleFilter(Generic[Control]):
     def weigh(self, sensor: Sensor[M], measurement: M) -> Evidence:
         """Line 5: multiply every weight by the measurement's likelihood.
 
-        The evidence is taken over at most 1,024 particles evenly spaced among all; up to that count it is
+        The evidence is taken over at most 2,048 particles evenly spaced among all; up to that count it is
         exact.
 
         Raises
