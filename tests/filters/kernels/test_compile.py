@@ -34,6 +34,19 @@ def test_a_kernel_refuses_other_types() -> None:
         weights.peak(np.zeros(3, np.float64), 0, 3)  # pyright: ignore[reportArgumentType]
 
 
+def test_a_direct_call_is_the_same_kernel() -> None:
+    """Also where the kernel was only noted at its import and compiled by ``compile_all``, as in the daemon."""
+    logs = np.array([1.0, 7.0, -3.0], np.float32)
+    assert weights.peak.direct(logs, 0, 3) == weights.peak(logs, 0, 3) == 7.0
+    code = (
+        "from filters.kernels.compile import compile_all\n"
+        "compile_all(['filters.sensing.range'])\n"
+        "from filters.sensing import range\n"
+        "assert 'Dispatcher' not in type(range.gaussian.direct).__name__, type(range.gaussian.direct)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[3])
+
+
 STEP = """
 import numpy as np
 from filters.motion import Unicycle, UnicycleControl
