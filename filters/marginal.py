@@ -44,7 +44,7 @@ from filters.kalman import (
 from filters.kernels import marginal as kernels
 from filters.kernels import random, weights
 from filters.kernels.compile import Float32Array
-from filters.kernels.resampling import deal
+from filters.kernels.resampling import RUN, deal
 from filters.particle_set import ParticleSet
 from filters.sensing.model import Sensor
 
@@ -222,7 +222,6 @@ class MarginalFilter(Generic[Control]):
         self._particles = ParticleSet(self.names, capacity)
         self._spare: Float32Array = np.zeros_like(self._particles.columns)
         self._weights: Float32Array = np.zeros(capacity, np.float32)
-        self._places = np.arange(capacity, dtype=np.int32)
         self._bounds: list[tuple[int, int]] = []
         self._sums = np.zeros(2)
         self.covariance: Matrix = np.zeros((len(motion.linear), len(motion.linear)))
@@ -424,7 +423,8 @@ class MarginalFilter(Generic[Control]):
         uniform = random.uniform(self._seed, _RESAMPLING_STREAM, self._draws)
         ancestors = resampling.systematic(self.weights, target, uniform)
         columns = self._particles.columns
-        deal(columns, self._spare, ancestors, self._places[:target])
+        whole = np.array((0, target))  # in one block: copies stay in the order of their ancestors
+        deal(columns, self._spare, ancestors, whole, 0, -(-target // RUN))
         self._particles.columns, self._spare = self._spare, columns
         self._recount(target)
         self._level()
@@ -463,15 +463,15 @@ class MarginalFilter(Generic[Control]):
         """Make weights of the log weights; return the log of the mean likelihood, with its constant."""
         before = self._sums[0]
         logs = self._particles.log_weights
-        top = float(weights.peak(logs, 0, self.count))
-        if not weights.NOTHING < top < math.inf:
+        starts = np.array([*(first for first, _ in self._bounds), self.count])
+        rows = np.zeros((len(self._bounds), 2))
+        top, total, squares = weights.normalize(logs, self._weights, starts, rows)
+        if not total > 0.0:
             self.collapses += 1
             self._level()
             return -math.inf
-        self._sums = np.zeros(2)
-        for first, last in self._bounds:
-            weights.exponentiate(logs, self._weights, first, last, top, self._sums)
-        return constant + top + math.log(self._sums[0] / before)
+        self._sums = np.array((total, squares))
+        return constant + top + math.log(total / before)
 
     def _level(self) -> None:
         """Make all weights equal."""
