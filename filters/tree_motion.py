@@ -85,7 +85,8 @@ def _parts(
     """Return moved centres, moved half widths and masses of the boxes, halved where the motion bends them.
 
     A box is halved along the axis over which the other coordinates are displaced most differently, as long
-    as they differ by more than the noise, the finest width and a quarter of the box itself.
+    as they differ by more than the noise, the finest width and a quarter of the box itself. Its two halves are
+    looked at apart, and nothing wider than 0.4 turns is carried whole: a cosine is the same at both ends of one.
     """
     done: list[tuple[Array, Array, Array]] = []
     for round_ in range(ROUNDS + 1):
@@ -96,10 +97,15 @@ def _parts(
         for k in range(sides.dimension):
             step = np.zeros_like(width)
             step[:, k] = 0.5 * width[:, k]
-            change = _moved(sides, move, centre + step) - _moved(sides, move, centre - step)
+            upper, lower = (
+                _moved(sides, move, centre + step) - moved,
+                moved - _moved(sides, move, centre - step),
+            )
+            change, bend = upper + lower, np.abs(upper) + np.abs(lower)
             halves[:, k] = 0.5 * np.abs(width[:, k] + change[:, k])
-            change[:, k] = 0.0
-            shear[:, k] = (np.abs(change) / allowed).max(axis=1)
+            bend[:, k] = 0.0
+            shear[:, k] = (bend / allowed).max(axis=1)
+            shear[width[:, k] > 0.4 * sides.periods[k], k] = np.inf
         halves = np.maximum(halves, 1e-9 * sides.finest)
         along = np.where(shear.max(axis=1) > 1.0, shear.argmax(axis=1), -1)
         if round_ == ROUNDS:

@@ -66,10 +66,10 @@ class Sides:
         if not sides:
             raise ValueError("density tree: at least one side is needed")
         self.dimension = len(sides)
-        self.low: Array = np.array([side.low for side in sides])
-        self.high: Array = np.array([side.high for side in sides])
-        self.finest: Array = np.array([side.finest for side in sides])
-        self.coarsest: Array = np.array([side.coarsest for side in sides])
+        self.low: Array = np.array([side.low for side in sides], np.float64)
+        self.high: Array = np.array([side.high for side in sides], np.float64)
+        self.finest: Array = np.array([side.finest for side in sides], np.float64)
+        self.coarsest: Array = np.array([side.coarsest for side in sides], np.float64)
         self.wraps: Mask = np.array([side.wraps for side in sides])
         self.periods: Array = np.where(self.wraps, self.high - self.low, math.inf)
 
