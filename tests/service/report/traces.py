@@ -51,15 +51,17 @@ def trace(seconds: float, sensors: int = 2) -> tuple[Trace, Truth]:
     }
     shadow = {name: ticks[name] for name in ("east", "nn", "ne", "ee")} | {"north": known(north + 2 * OFF)}
     slow = {"gyro_bias": (known(flat(0.005)), known(flat(0.001)))}
-    readings = round(seconds * 10)
-    when = np.sort(random.uniform(START, START + seconds, readings))
-    value = random.standard_normal(readings)
-    outlier = np.abs(value) > 2.5
-    innovations = {
-        f"range/autopilot/{k}": Innovations(when, value, np.ones(readings), outlier, 1)
-        for k in range(sensors)
-    } | {"position/gnss": Innovations(when, np.abs(value), np.ones(readings), outlier, 2)}
-    return Trace(ticks, shadow, slow, innovations), Truth(time, north, east)
+
+    def innovations(dimensions: int) -> Innovations:
+        readings = round(seconds * 10)
+        value = random.standard_normal(readings)
+        when = np.sort(random.uniform(START, START + seconds, readings))
+        return Innovations(when, value, np.ones(readings), np.abs(value) > 2.5, dimensions)
+
+    sensed = {f"range/autopilot/{k}": innovations(1) for k in range(sensors)} | {
+        "position/gnss": innovations(2)
+    }
+    return Trace(ticks, shadow, slow, sensed), Truth(time, north, east)
 
 
 def run_of(traced: Trace, truth: Truth | None, seed: int = 0) -> Run:
