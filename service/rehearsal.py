@@ -47,7 +47,7 @@ def rehearse(configuration: Configuration) -> dict[str, Shape]:
     """Run a second of ticks with few and with many particles; return the shape of every stage that ran."""
     few = configuration.budget.particles_min
     many = min(configuration.budget.particles_max, max(MANY, 2 * few))
-    cheap, dear = _costs(configuration, few), _costs(configuration, many)
+    cheap, dear = costs(configuration, few), costs(configuration, many)
     return {
         stage: line(few, cheap[stage], many, dear[stage])
         for stage in PARTICLE_STAGES
@@ -63,8 +63,8 @@ def line(few: int, cheap: float, many: int, dear: float) -> Shape:
     return Shape(max(dear - slope * many, 0.0), slope)
 
 
-def _costs(configuration: Configuration, count: int) -> dict[str, float]:
-    """Return the median cost of every stage at ``count`` particles, over the ticks in which it ran."""
+def costs(configuration: Configuration, count: int) -> dict[str, float]:
+    """Return the median cost of every stage at ``count`` particles, seconds, over the ticks in which it ran."""
     meters = Meters(_TICKS)
     start = Start(mode="given", position=(0.0, 0.0, 0.0), heading=0.0, sigma_heading=0.1)
     budget = configuration.budget.model_copy(update={"particles_min": count, "particles_max": count})
