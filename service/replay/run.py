@@ -163,7 +163,8 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
     readers = [open_log(path, plan.configuration) for path in plan.logs]
     began = time.perf_counter()
     estimator = Estimator(plan.configuration, seed=seed)
-    beside = ShadowTally(estimator.accompany(Shadow))
+    shadow = estimator.accompany(Shadow)
+    beside = ShadowTally(shadow)
     tracer = estimator.accompany(lambda vehicle, belief: Tracer()) if plan.traced == seed else None
     samples = merged(readers)
     first = next(samples, None)
@@ -179,9 +180,9 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
             estimator.ingest(batch)
             estimate = estimator.tick(now, now, afforded, course)
             tally.add(estimate)
-            shadow = beside.add(now, estimate.time)
+            beside.add(now, estimate.time)
             if tracer is not None:
-                tracer.add(estimate, shadow)
+                tracer.add(estimate, shadow.at(now))
             if file is not None:
                 file.write(estimate, now)
             if tally.ticks % 256 == 0:

@@ -8,9 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from service.estimate import Estimate, HealthState
-from service.estimator.carrier import Pose
 from service.estimator.shadow import Shadow
+from service.estimator.track import SECOND
 from service.score import UNSCORED, Score, Track, Truth, score
+
+SHADOW_INTERVAL = SECOND // 10
+"""Nanoseconds between two points of the shadow's track."""
 
 
 @dataclass
@@ -75,7 +78,7 @@ class ShadowRun:
     Attributes
     ----------
     ticks : int
-        In how many it had a position: it begins once the heading is known.
+        At how many times, ten a second, it had a position: it begins once the heading is known.
     accepted, gated, unsupported : dict[str, int]
         Measurements by sensor: weighed in; kept out by the gate; of a model that it has no derivative of.
     failure : str
@@ -102,19 +105,26 @@ class ShadowRun:
 
 
 class ShadowTally:
-    """The shadow's poses of a run, with what became of its measurements."""
+    """The shadow's poses of a run, with what became of its measurements.
+
+    It is asked where it is :data:`SHADOW_INTERVAL` apart: a track is measured as well by ten points a second, and
+    carrying the belief to every tick would cost the replay more than the filter itself.
+    """
 
     def __init__(self, shadow: Shadow) -> None:
         self.path = Path2D()
         self._shadow = shadow
+        self._asked: int | None = None
 
-    def add(self, now: int, time: float) -> Pose | None:
-        """Ask the shadow where it is at ``now`` (nanoseconds; ``time``: the same as Unix seconds), and return it."""
+    def add(self, now: int, time: float) -> None:
+        """Ask the shadow where it is at ``now`` (nanoseconds; ``time``: the same as Unix seconds), if it is time."""
+        if self._asked is not None and now - self._asked < SHADOW_INTERVAL:
+            return
+        self._asked = now
         pose = self._shadow.at(now)
         if pose is not None:
             nn, ne, ee = (float(pose.covariance[i, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
             self.path.add(time, pose.mean("north"), pose.mean("east"), (nn, ne, ee))
-        return pose
 
     def run(self, truth: Truth | None) -> ShadowRun:
         """Return the figures."""
