@@ -38,7 +38,10 @@ format: $(INSTALLED) ## let ruff rewrite the sources
 
 bench: install ## what this machine affords, and how the loop keeps its deadlines
 	$(BIN)/python benchmarks/step.py --models
-	$(BIN)/python benchmarks/deadline.py
+	$(BIN)/python benchmarks/afford.py
+	$(BIN)/python benchmarks/compare.py
+	$(BIN)/python benchmarks/saturation.py
+	$(BIN)/python benchmarks/deadline.py --matrix
 
 system: install ## the daemon under real systemd with a real vcan0, in a guest
 	bash tests/system/run.sh

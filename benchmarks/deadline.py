@@ -1,9 +1,13 @@
-"""Deadlines under load: the real daemon at RATE beside a MAVLink link of FLOOD messages/s, for SECONDS.
+"""Deadlines under load: the real daemon at a rate, beside a load, for SECONDS.
 
-``python benchmarks/deadline.py --rate 100 --seconds 600 --flood 2000``. One sender process paces frames that
+    python benchmarks/deadline.py --rate 100 --load link --flood 2000 --seconds 600      one run, told at length
+    python benchmarks/deadline.py --matrix [--rates 50,100,200] [--seconds 30]           all loads, a table
+
+Loads: ``idle`` (a calm link of 400 messages/s), ``stress`` (the same beside ``stress-ng --cpu 4 --vm 1``), ``link``
+(FLOOD messages/s), ``stopped`` (a subscriber that is stopped with SIGSTOP). One sender process paces frames that
 were packed beforehand (stamps and sums are patched in place); a Zenoh subscriber reads what the daemon says
-of itself. Printed: missed ticks, lateness, use of the budget, drops, particles, memory of every process, and
-the time from the start of the daemon to its first estimate.
+of itself. Printed: missed ticks, lateness, use of the budget, drops, level and count over time, memory of every
+process, and the time from the start of the daemon to its first estimate. ``--matrix`` writes docs/performance.md.
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ import argparse
 import contextlib
 import json
 import os
+import shutil
 import signal
 import socket
 import struct
@@ -21,15 +26,22 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 import zenoh
+from report import machine, write
 
 from service.estimate import Budget, Estimate, Sensors, Status
 
 ROOT = Path(__file__).parents[1]
+LOADS = ("idle", "stress", "link", "stopped")
+CALM = 400
+"""Messages per second of the vehicle where the link is not the load."""
+
+SETTLED = 5
+"""Seconds after which page faults count."""
 BEACONS = {0: (20.0, 10.0), 1: (-5.0, 20.0), 2: (30.0, -15.0), 3: (-20.0, -10.0)}
 SPEED = 1.0
 UNKNOWN = 2**31 - 1
@@ -59,13 +71,64 @@ directory = "{folder}"
 """
 
 
+class Outcome(NamedTuple):
+    """What one run came to."""
+
+    last: Budget
+    counts: list[int]
+    faults: float
+
+
 def main() -> None:
     arguments = parse()
     if arguments.send_to:
         send(arguments.send_to, arguments.flood, arguments.seconds)
-        return
+    elif arguments.matrix:
+        matrix(arguments)
+    else:
+        run(arguments)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
     with tempfile.TemporaryDirectory(prefix="beliefd-deadline-") as folder:
-        measure(arguments, Path(folder))
+        return measure(arguments, Path(folder))
+
+
+def matrix(arguments: argparse.Namespace) -> None:
+    """Run every load at every rate, and write the table."""
+    outcomes: list[tuple[str, Outcome]] = []
+    for priority in map(int, arguments.priorities.split(",")):
+        for load in arguments.loads.split(","):
+            for rate in map(float, arguments.rates.split(",")):
+                settings = vars(arguments) | {"rate": rate, "load": load, "priority": priority}
+                settings["flood"] = arguments.flood if load == "link" else CALM
+                print(f"--- {rate:g} Hz, {load}, priority {priority}", flush=True)
+                kind = f"{load}, SCHED_FIFO {priority}" if priority else load
+                outcomes.append((kind, run(argparse.Namespace(**settings))))
+    write("deadline", table(outcomes, arguments))
+
+
+def table(outcomes: list[tuple[str, Outcome]], arguments: argparse.Namespace) -> str:
+    lines = [
+        f"{arguments.seconds:g} s each, budget {arguments.budget:g} ms a tick. Lateness: from the deadline of a tick "
+        "to its start, over the whole run. Levels: ticks at each. Faults: page faults per 1,000 ticks after the first "
+        "five seconds.",
+        "",
+        "| load | Hz | ticks | missed | rested | cut | late, ms: 50 % | 99 % | 99.9 % | worst "
+        "| count, median (10 to 90 %) | levels | faults |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for load, outcome in outcomes:
+        last, late = outcome.last, outcome.last.run_lateness
+        assert late is not None
+        low, middle, high = np.percentile(outcome.counts or [0], (10, 50, 90))
+        levels = ", ".join(f"{level}: {ticks}" for level, ticks in last.levels.items() if ticks)
+        lines.append(
+            f"| {load} | {last.rate:g} | {last.ticks} | {last.missed_ticks} | {last.rested_ticks} | {last.cut_ticks} "
+            f"| {late.median:.2f} | {late.p99:.2f} | {late.p999:.2f} | {late.worst:.2f} "
+            f"| {middle:.0f} ({low:.0f} to {high:.0f}) | {levels} | {outcome.faults:.1f} |"
+        )
+    return "\n".join([*lines, "", f"Machine: {machine()}. By `python benchmarks/deadline.py --matrix`."])
 
 
 def parse() -> argparse.Namespace:
@@ -75,6 +138,11 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--flood", type=int, default=2000, help="MAVLink messages per second")
     parser.add_argument("--budget", type=float, default=4.0, help="ms per tick")
     parser.add_argument("--priority", type=int, default=0, help="SCHED_FIFO priority, 0: ordinary")
+    parser.add_argument("--load", choices=LOADS, default="link")
+    parser.add_argument("--matrix", action="store_true")
+    parser.add_argument("--loads", default=",".join(LOADS), help="of the matrix")
+    parser.add_argument("--priorities", default="0,10", help="of the matrix: SCHED_FIFO, 0: ordinary")
+    parser.add_argument("--rates", default="50,100,200", help="of the matrix")
     parser.add_argument("--send-to", type=int, default=0, help=argparse.SUPPRESS)
     return parser.parse_args()
 
@@ -153,7 +221,67 @@ def patched(dialect: Any, mav: Any, kind: str, head: bytes, number: int) -> byte
 # --- the observer -----------------------------------------------------------------------------------
 
 
-def measure(arguments: argparse.Namespace, folder: Path) -> None:
+@contextlib.contextmanager
+def loaded(load: str, endpoint: str) -> Iterator[None]:
+    """Have the load beside the daemon for as long as this lasts."""
+    if load == "stress":
+        others = subprocess.Popen(
+            stress(), stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+    elif load == "stopped":
+        others = subprocess.Popen(
+            [sys.executable, "-c", SUBSCRIBER, endpoint], stdout=subprocess.PIPE, text=True
+        )
+        assert others.stdout is not None
+        others.stdout.readline()
+        others.send_signal(signal.SIGSTOP)
+    else:
+        yield
+        return
+    try:
+        yield
+    finally:
+        others.send_signal(signal.SIGCONT)
+        if others.stdin is not None:
+            others.stdin.close()
+        others.terminate()
+        others.wait()
+
+
+def stress() -> list[str]:
+    """Return the command of the load: stress-ng, or where that is absent four processes that only count."""
+    if shutil.which("stress-ng"):
+        return ["stress-ng", "--cpu", "4", "--vm", "1", "--timeout", "0"]
+    print("no stress-ng here: four processes that only count, in its place")
+    return [sys.executable, "-c", SPINNERS]
+
+
+SPINNERS = """
+import signal, subprocess, sys
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+spinners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(4)]
+try:
+    sys.stdin.read()
+finally:
+    for spinner in spinners:
+        spinner.kill()
+"""
+SUBSCRIBER = """
+import json, sys, time, zenoh
+settings = zenoh.Config()
+settings.insert_json5("mode", '"client"')
+settings.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
+settings.insert_json5("scouting/multicast/enabled", "false")
+session = zenoh.open(settings)
+subscriber = session.declare_subscriber("beliefd/v1/rover/**")
+subscriber.recv()
+print("heard", flush=True)
+while True:
+    subscriber.recv()
+"""
+
+
+def measure(arguments: argparse.Namespace, folder: Path) -> Outcome:
     port, zenoh_port = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_STREAM)
     endpoint = f"tcp/127.0.0.1:{zenoh_port}"
     file = configure(arguments, folder, port, endpoint)
@@ -166,7 +294,7 @@ def measure(arguments: argparse.Namespace, folder: Path) -> None:
         )
     try:
         with open_client(endpoint) as session:
-            observe(arguments, session, daemon, began, port)
+            return observe(arguments, session, daemon, began, port, endpoint)
     finally:
         daemon.send_signal(signal.SIGTERM)
         daemon.wait()
@@ -174,30 +302,51 @@ def measure(arguments: argparse.Namespace, folder: Path) -> None:
 
 
 def observe(
-    arguments: argparse.Namespace, session: Any, daemon: subprocess.Popen[bytes], began: float, port: int
-) -> None:
+    arguments: argparse.Namespace,
+    session: Any,
+    daemon: subprocess.Popen[bytes],
+    began: float,
+    port: int,
+    endpoint: str,
+) -> Outcome:
     estimates = session.declare_subscriber("beliefd/v1/rover/estimate", zenoh.handlers.RingChannel(4096))
     states = session.declare_subscriber("beliefd/v1/rover/*", zenoh.handlers.RingChannel(4096))
     first = first_estimate(estimates)
     print(f"start of the daemon to its first estimate: {first.monotonic_ns * 1e-9 - began:.2f} s")
     command = [sys.executable, str(Path(__file__)), "--send-to", str(port)]
     command += ["--flood", str(arguments.flood), "--seconds", str(arguments.seconds)]
-    sender = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
     budgets: list[Budget] = []
     links: Sensors | None = None
     heard: list[Estimate] = [first]
-    while sender.poll() is None:
-        heard += [msgspec.json.decode(p, type=Estimate) for _, p in drained(estimates)]
-        for key, payload in drained(states):
-            if key.endswith("/budget"):
-                budgets.append(msgspec.json.decode(payload, type=Budget))
-            elif key.endswith("/sensors"):
-                links = msgspec.json.decode(payload, type=Sensors)
-        time.sleep(0.02)
+    with loaded(arguments.load, endpoint):
+        sender = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+        while sender.poll() is None:
+            heard += [msgspec.json.decode(p, type=Estimate) for _, p in drained(estimates)]
+            for key, payload in drained(states):
+                if key.endswith("/budget"):
+                    budgets.append(msgspec.json.decode(payload, type=Budget))
+                elif key.endswith("/sensors"):
+                    links = msgspec.json.decode(payload, type=Sensors)
+            time.sleep(0.02)
     assert sender.stdout is not None
     print("sender:", sender.stdout.read().strip())
     report(heard, budgets, links)
+    over_time(budgets)
     memory(session, daemon.pid)
+    settled = budgets[SETTLED:]
+    ticks = settled[-1].ticks - settled[0].ticks if len(settled) > 1 else 0
+    faults = 1e3 * sum(budget.page_faults for budget in settled[1:]) / max(1, ticks)
+    print(f"page faults per 1,000 ticks after {SETTLED} s: {faults:.1f}")
+    return Outcome(budgets[-1], [estimate.particles for estimate in heard if estimate.particles], faults)
+
+
+def over_time(budgets: list[Budget]) -> None:
+    """Print at most twenty lines: what was demanded, afforded and used, and what was given up."""
+    print("   s  demanded afforded     used level  missed  why")
+    for budget in budgets[:: max(1, len(budgets) // 20)]:
+        elapsed = budget.time - budgets[0].time
+        print(f"{elapsed:4.0f} {budget.demanded:9} {budget.afforded:8} {budget.particles:8} {budget.level:5} "
+              f"{budget.missed_ticks:7}  {budget.level_reason}")  # fmt: skip
 
 
 def report(heard: list[Estimate], budgets: list[Budget], links: Sensors | None) -> None:

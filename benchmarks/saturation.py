@@ -88,12 +88,13 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=15.0)
     parser.add_argument("--counts", default=COUNTS)
     parser.add_argument("--repeats", type=int, default=1)
+    parser.add_argument("--priority", type=int, default=0, help="SCHED_FIFO, of both kinds; 0: ordinary")
     parser.add_argument("--draw-only", action="store_true")
     parser.add_argument("--point", default="", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.point:
         kind, _, count = arguments.point.partition(",")
-        print(json.dumps(measure(kind, int(count), arguments.seconds)))
+        print(json.dumps(measure(kind, int(count), arguments.seconds, arguments.priority)))
         return
     if not arguments.draw_only:
         measure_all(arguments)
@@ -118,6 +119,8 @@ def measure_all(arguments: argparse.Namespace) -> None:
                     f"{kind},{count}",
                     "--seconds",
                     str(arguments.seconds),
+                    "--priority",
+                    str(arguments.priority),
                 ]
                 done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
                 row = json.loads(done.stdout)
@@ -211,14 +214,15 @@ def configured(kind: str, count: int) -> Configuration:
     return configuration
 
 
-def measure(kind: str, count: int, seconds: float) -> dict[str, Any]:
+def measure(kind: str, count: int, seconds: float, priority: int) -> dict[str, Any]:
     configuration = configured(kind, count)
     samples, estimates, heart = pair(1 << 21), pair(1 << 21), pair(1 << 16)
     meters = Meters(RATE)
     estimator = Insatiable(configuration, meters)
     inlet, outlet, pulse = Inlet("radio", samples.inlet), Outlet(estimates.outlet), Heart(heart.outlet)
     loop = Loop(configuration, estimator, meters, [inlet], outlet, pulse, rehearse(configuration))
-    punctual(0, ())
+    for refusal in punctual(priority, ()):
+        print(refusal, file=sys.stderr)
     freeze_garbage()
     simulation = Simulation(samples, estimates, seconds)
     loop.run(simulation.over)
@@ -234,6 +238,7 @@ def measure(kind: str, count: int, seconds: float) -> dict[str, Any]:
         "particles": median(estimate.particles for estimate in decoded),
         "tick_ms": 1e3 * meters.durations.quantile(0.5),
         "levels": " ".join(f"{level}:{number}" for level, number in sorted(levels.items())),
+        "priority": priority,
         "load": os.getloadavg()[0],
     }
 
@@ -249,8 +254,8 @@ def table(rows: list[dict[str, str]]) -> str:
     lines = [
         "![Error and missed deadlines against the particles asked for](performance-saturation.svg)",
         "",
-        f"{RATE:g} Hz; the budget is {BUDGET_MS:g} ms a tick. Error: of the last estimate published by each instant, "
-        "against the truth at that instant.",
+        f"{RATE:g} Hz, SCHED_FIFO priority {rows[0]['priority']} (0: ordinary), budget {BUDGET_MS:g} ms a tick. "
+        "Error: of the last estimate published by each instant, against the truth at that instant.",
         "",
         "| asked for | | used (median) | tick ms (median) | deadlines missed | error m (RMS) | 95 % m |",
         "|---|---|---|---|---|---|---|",

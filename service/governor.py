@@ -59,6 +59,9 @@ FADING = 0.98
 PERIOD_SHARE = 0.9
 """Of the period, what ticks may last, waiting included."""
 
+WAITING = 0.9
+"""Share of the ticks that waited no longer than is reckoned with: a single stall makes a few late, and is over."""
+
 LEAST_SHARE = 0.25
 """Of the budget, what is spent however long ticks wait: few particles do not make others faster."""
 
@@ -159,7 +162,7 @@ class Governor:
         self._scales = {stage: _expecting(COLD) for stage in shapes}
         self._fixed: dict[str, RunningQuantile] = {}
         self._each = RunningQuantile(WINDOW, PROBABILITY)
-        self._waits = _expecting(0.0)
+        self._waits = RunningQuantile(WINDOW, WAITING)
         self._rung = WHOLE
         self._calm = 0
         self._since_shrinking = SETTLE

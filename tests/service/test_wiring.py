@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterator
 from itertools import pairwise
@@ -160,3 +161,15 @@ def test_nothing_is_left_open(file: Path) -> None:
     wiring.reload()
     wiring.close()
     assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
+def test_a_recorder_runs_where_a_decision_log_is_asked_for(file: Path, tmp_path: Path) -> None:
+    """It and the loop get the two ends of one queue, and nobody gets them otherwise."""
+    with contextlib.closing(Wiring(file, tmp_path / "log.csv")) as wiring:
+        programs = {program.name: program for program in wiring.programs()}
+    recorder, loop = programs["recorder"], programs["loop"]
+    assert str(tmp_path / "log.csv") in recorder.command
+    assert int(loop.command[loop.command.index("--decisions") + 1]) in loop.descriptors
+    assert int(recorder.command[recorder.command.index("--records") + 1]) in recorder.descriptors
+    with contextlib.closing(Wiring(file)) as wiring:
+        assert "recorder" not in {program.name for program in wiring.programs()}

@@ -11,12 +11,14 @@ from pathlib import Path
 import pytest
 
 from drivers.sample import Odometer, Sample
+from service.decisions import Decided
+from service.estimator import Cause, Level
 from service.replay import Plan, Run, replay
 from service.replay.rows import HEADER
 from service.replay.run import ticks_of
 from service.replay.seeds import replay_seeds, summary
 from service.replay.site import setting_of
-from service.replay.sources import LogError
+from service.replay.sources import LogError, merged, open_log
 from service.score import read_truth
 
 SECOND = 1_000_000_000
@@ -92,6 +94,31 @@ def test_one_row_a_tick_with_the_promised_columns_and_the_same_bytes_again(
     assert float(rows[-1]["radius95_m"]) > 0
     times = [float(row["time_s"]) for row in rows]
     assert times == sorted(times)
+
+
+def test_a_decision_log_gives_every_tick_what_it_had(drive: Path, tmp_path: Path) -> None:
+    """Ten ticks a second from the log's own clock; the count alternates, one in ten only predicts: so it comes out."""
+    logs = logs_of(drive)
+    setting = setting_of(logs, None, None)
+    start = next(merged([open_log(path, setting.configuration) for path in logs])).received
+    decisions = tuple(
+        Decided(
+            tick, 0, start + tick * SECOND // 10, 300 + 200 * (tick % 2),
+            Level.PREDICTION_ONLY if tick % 10 == 9 else Level.FEWER_PARTICLES, Cause.BUDGET,
+            0 if tick % 10 == 9 else 64, -1, 0, (),
+        )
+        for tick in range(200)
+    )  # fmt: skip
+    plan = Plan(logs, setting.configuration, 2000, None, tmp_path, decisions=decisions)
+    run = replay(plan, 0)
+    with (tmp_path / "estimates_seed0.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert run.ticks == len(rows) == 200
+    assert [int(row["afforded"]) for row in rows] == [decision.afforded for decision in decisions]
+    started = [index for index, row in enumerate(rows) if row["north_m"]]
+    assert {rows[index]["level"] for index in started if index % 10 == 9} == {"5"}
+    assert {rows[index]["level"] for index in started if index % 10 != 9} == {"1"}
+    assert any("prediction only" in refused for _, refused in run.sensors.values())
 
 
 def test_seeds_run_side_by_side_and_keep_their_order(drive: Path) -> None:
