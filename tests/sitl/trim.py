@@ -1,4 +1,4 @@
-"""Trim a recording to what a replay needs of it: ``python tests/sitl/trim.py RECORDING.tlog ... --out tests/sitl/data``.
+"""Trim a recording to what a replay needs of it: ``python tests/sitl/trim.py RECORDING.tlog ... --out FOLDER``.
 
 Frames are kept or left out whole, stamp and bytes as recorded. Kept are the messages that the estimate is made of, the
 ones that set the clocks and the origin, and the first of every other kind: that a log holds a simulator's messages says
