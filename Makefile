@@ -1,11 +1,12 @@
 # beliefd: every target makes what it needs, from a fresh clone.  `make help` lists them.
 PYTHON ?= python3
+SEEDS ?= 20
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test lint format bench system docs figures clean
+.PHONY: help install demo test coverage lint format bench system docs figures accuracy clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -25,6 +26,14 @@ demo: install ## the main job, live in the terminal for a minute
 
 test: install ## every test
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+coverage: install ## branch coverage of filters/, its kernels run as plain Python too
+	rm -f .coverage .coverage.*
+	COVERAGE_FILE=.coverage.compiled $(BIN)/python -m pytest tests/filters -n 2 --dist worksteal --cov=filters --cov-report=
+	COVERAGE_FILE=.coverage.interpreted NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest tests/filters -m interpreted \
+	  -n 2 --dist worksteal --cov=filters --cov-report= -W ignore::RuntimeWarning
+	$(BIN)/coverage combine .coverage.compiled .coverage.interpreted
+	$(BIN)/coverage report --include 'filters/*' --show-missing --skip-covered --fail-under 95
 
 lint: $(INSTALLED) ## style, types and the walls between the packages
 	$(BIN)/ruff check .
@@ -54,5 +63,8 @@ figures: install ## the figures of docs/filters/, from the filters themselves
 	NUMBA_CACHE_DIR=$$($(BIN)/python -c 'from service import kernels; print(kernels.prepare())') PYTHONPATH=. $(BIN)/python docs/figures.py
 	$(BIN)/beliefd textbook --out docs/filters/textbook
 
+accuracy: install ## replay every recording there is, and write the table of docs/accuracy.md
+	$(BIN)/python docs/accuracy.py --seeds $(SEEDS)
+
 clean: ## remove everything that was made
-	rm -rf $(VENV) .vm build dist .pytest_cache .ruff_cache .hypothesis .coverage
+	rm -rf $(VENV) .vm build dist .pytest_cache .ruff_cache .hypothesis .coverage .coverage.*

@@ -14,6 +14,7 @@ from filters.cells import CellIntegral, CellMean, Nodes, log_mean
 DISTANCES = np.arange(-6, 7)[None, :] * 0.5 + np.array([[0.0], [0.2], [-0.13]])
 
 
+@pytest.mark.interpreted
 def test_shares_by_the_mean_state_are_densities_normalised() -> None:
     density = stats.norm.pdf(DISTANCES, scale=0.4)
     np.testing.assert_allclose(
@@ -21,6 +22,7 @@ def test_shares_by_the_mean_state_are_densities_normalised() -> None:
     )
 
 
+@pytest.mark.interpreted
 def test_shares_by_integral_are_probabilities() -> None:
     exact = stats.norm.cdf(DISTANCES + 0.25, scale=0.4) - stats.norm.cdf(DISTANCES - 0.25, scale=0.4)
     np.testing.assert_allclose(CellIntegral(2).shares(DISTANCES, 0.5, 0.4), exact, atol=1e-12)

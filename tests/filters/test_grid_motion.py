@@ -61,6 +61,7 @@ def brute_force(grid: Grid, move: object, sigma: np.ndarray, belief: np.ndarray)
     return target
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("move", [unicycle, entangled, spelled_out])
 def test_it_equals_the_dense_matrix(move: object) -> None:
     belief = np.random.default_rng(1).dirichlet(np.ones(GRID.size)).reshape(GRID.shape)
@@ -71,6 +72,7 @@ def test_it_equals_the_dense_matrix(move: object) -> None:
     assert departed > 0.1
 
 
+@pytest.mark.interpreted
 def test_axis_by_axis_is_the_same_as_cell_by_cell() -> None:
     belief = np.random.default_rng(2).dirichlet(np.ones(GRID.size)).reshape(GRID.shape)
     motion, every = GridMotion(GRID, CellMean()), np.arange(GRID.size)
@@ -94,6 +96,7 @@ def test_what_is_not_chosen_stays(cells: CellMean | CellIntegral, move: object) 
     np.testing.assert_allclose(target, alone + (belief - moving), atol=1e-14)
 
 
+@pytest.mark.interpreted
 def test_the_integral_over_source_and_target_cell_equals_quadrature() -> None:
     """Equation 4.9 for a motion that bends, to 1e-9, by scipy's quad over the source cell."""
     axis, sigma = Axis(-2.0, 2.0, 8), 0.3
@@ -116,6 +119,7 @@ def test_the_integral_over_source_and_target_cell_equals_quadrature() -> None:
             assert target[cell] == pytest.approx(exact, abs=1e-9)
 
 
+@pytest.mark.interpreted
 def test_without_noise_a_cell_moves_as_one() -> None:
     grid = Grid([Axis(0.0, 5.0, 5), circle(4)])
     belief = np.zeros((5, 4))

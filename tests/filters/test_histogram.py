@@ -98,6 +98,7 @@ def test_a_measurement_that_no_cell_explains_changes_nothing() -> None:
         np.testing.assert_allclose(belief.belief, np.array([1.0, 2.0, 3.0, 0.0]) / 6.0)
 
 
+@pytest.mark.interpreted
 def test_what_leaves_the_grid_is_counted() -> None:
     belief = HistogramFilter(Grid([Axis(0.0, 4.0, 4)]))
     assert belief.predict(lambda s: [s[0] + 1.0], [0.0]) == pytest.approx(0.25)
@@ -138,6 +139,7 @@ def test_a_smaller_share_costs_more_and_errs_less() -> None:
     assert errors[2] < 0.02
 
 
+@pytest.mark.interpreted
 def test_cells_under_the_threshold_keep_their_proportions() -> None:
     """The rest is one region with one likelihood: its mean over the rest, here by looking at all of it."""
     belief = HistogramFilter(Grid([Axis(0.0, 8.0, 8)]), share=0.5)
@@ -152,6 +154,7 @@ def test_cells_under_the_threshold_keep_their_proportions() -> None:
     assert evidence == pytest.approx(math.log(expected.sum() / start.sum()), abs=1e-12)
 
 
+@pytest.mark.interpreted
 def test_a_belief_that_was_wrong_finds_back() -> None:
     """A thousandfold certain of the wrong place, with cells elsewhere not weighed one by one."""
     belief = HistogramFilter(Grid([Axis(0.0, 100.0, 100)]), share=1e-2)

@@ -56,6 +56,7 @@ def test_what_makes_no_sense_is_refused(error: float, probability: float) -> Non
         bound(2, error, probability)
 
 
+@pytest.mark.interpreted
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(1, 3000),
@@ -98,6 +99,7 @@ def test_particles_without_weight_do_not_count() -> None:
     assert Demand(1.0, 7.0).bins(Cloud(columns, weights)) == 4
 
 
+@pytest.mark.interpreted
 def test_demand_keeps_to_its_limits() -> None:
     rng = np.random.default_rng(2)
     wide = Cloud(np.stack([rng.uniform(0, 500, 5000), rng.uniform(0, 500, 5000), np.zeros(5000)]))
@@ -174,6 +176,7 @@ def test_systematic_resampling_to_the_draws_keeps_the_bound() -> None:
         assert count == pytest.approx(bound(demand.bins(left), 0.05, 0.99), rel=0.05)
 
 
+@pytest.mark.interpreted
 def test_draws_from_one_bin_are_the_minimum() -> None:
     one_heavy = np.where(np.arange(5000) == 77, 1.0, 1e-30)
     scattered = np.random.default_rng(3).uniform(0, 1000, (3, 5000))
@@ -191,6 +194,7 @@ def test_draws_need_weights_and_a_number() -> None:
             Demand(0.5, 0.5).draws(Cloud(np.zeros((3, 5)), weights), 0.5)
 
 
+@pytest.mark.interpreted
 def test_stamps_start_anew_before_they_overflow() -> None:
     cloud, demand = spread_cloud(4, 500, 2.0), Demand(0.5, 10.0, minimum=40)
     first = demand.draws(cloud, 0.2)

@@ -371,6 +371,7 @@ def test_a_draw_that_is_certain_teaches_nothing() -> None:
     assert not gain.any()
 
 
+@pytest.mark.interpreted
 def test_angles_are_averaged_on_their_circle() -> None:
     belief = MarginalFilter(MixedUnicycle(Unicycle(0, 0, 0, 0)), capacity=2)
     belief.initialize(
@@ -395,6 +396,7 @@ class SeesHeadingLessBias:
         expected[0, : last - first] = particles.columns[2, first:last]
 
 
+@pytest.mark.interpreted
 def test_an_angles_innovation_is_wrapped() -> None:
     belief = MarginalFilter(MixedUnicycle(Unicycle(0, 0, 0, 0)), capacity=1)
     belief.initialize(
@@ -413,6 +415,7 @@ def started(count: int = 8) -> MarginalFilter[None]:
     return belief
 
 
+@pytest.mark.interpreted
 def test_a_set_that_cannot_explain_a_measurement_is_kept_and_counted() -> None:
     belief = started()
     evidence = belief.correct(SeesPositionAndVelocity(), Readings((1e19, 0.0)))
@@ -421,6 +424,7 @@ def test_a_set_that_cannot_explain_a_measurement_is_kept_and_counted() -> None:
     assert belief.effective_sample_size == 8.0
 
 
+@pytest.mark.interpreted
 def test_what_a_sensor_refuses_changes_nothing() -> None:
     belief = started()
     assert not belief.weigh(Range(1.0), RangeMeasurement(-1.0, 0.0, 0.0)).accepted

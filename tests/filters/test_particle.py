@@ -101,6 +101,7 @@ def test_evidence_is_the_density_of_the_innovation() -> None:
     assert evidence.accepted
 
 
+@pytest.mark.interpreted
 def test_evidence_of_a_small_set_is_exact_and_obeys_the_chain_rule() -> None:
     belief = started(500, block=64)
     sensor = Range(0.8, outliers=0.1, span=50.0)
@@ -120,6 +121,7 @@ def test_evidence_of_a_small_set_is_exact_and_obeys_the_chain_rule() -> None:
 # ---- against a plain rewriting
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("block", [64, 1000, 32768])
 def test_a_whole_step_is_that_of_a_plain_rewriting(block: int) -> None:
     count, duration = 3000, 0.1
@@ -240,6 +242,7 @@ def test_moments_far_from_the_origin_keep_their_digits() -> None:
 # ---- weights that go wrong
 
 
+@pytest.mark.interpreted
 def test_all_weights_zero_keeps_the_set() -> None:
     belief = started(1000)
     before = pose(belief)
@@ -265,6 +268,7 @@ def test_a_far_measurement_is_evidence_of_a_wrong_belief_not_of_none() -> None:
     assert pose(belief)[0][np.argmax(belief.weights)] == north.max()
 
 
+@pytest.mark.interpreted
 def test_one_particle() -> None:
     belief = started(1)
     for _ in range(3):
@@ -309,6 +313,7 @@ def test_a_refused_measurement_is_not_accepted() -> None:
 # ---- resampling
 
 
+@pytest.mark.interpreted
 @given(st.integers(1, 400), st.integers(1, 400), st.integers(1, 90), st.integers(0, 2**64 - 1))
 @settings(max_examples=60, deadline=None)
 def test_resampling_copies_whole_particles(source: int, target: int, block: int, seed: int) -> None:

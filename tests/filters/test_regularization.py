@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from filters.kernels.regularization import shrink
 from filters.regularization import Preserving, Spreading, root, silverman, weighted_covariance
+
+pytestmark = pytest.mark.interpreted
 
 
 @pytest.mark.parametrize(("count", "dimension"), [(50, 1), (1000, 2), (777, 5)])
@@ -38,3 +41,12 @@ def test_the_root_of_a_singular_covariance() -> None:
 def test_no_bandwidth_of_nothing(effective: float, dimension: int) -> None:
     with pytest.raises(ValueError, match="bandwidth"):
         silverman(effective, dimension)
+
+
+def test_shrinking_is_towards_the_mean_and_within_the_block() -> None:
+    columns = np.arange(12, dtype=np.float32).reshape(2, 6)
+    before = columns.copy()
+    shrink(columns, 1, 2, 5, 4.0, 0.25)
+    expected = before.copy()
+    expected[1, 2:5] = 4.0 + 0.25 * (before[1, 2:5] - 4.0)
+    np.testing.assert_allclose(columns, expected, rtol=1e-6)

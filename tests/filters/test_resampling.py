@@ -49,6 +49,7 @@ def near_a_tie(weights: list[float], count: int, uniform: float) -> bool:
     return False
 
 
+@pytest.mark.interpreted
 @given(weight_lists, st.integers(1, 100), uniforms)
 @settings(max_examples=300, deadline=None)
 def test_it_is_table_4_4(weights: list[float], count: int, uniform: float) -> None:
@@ -81,6 +82,7 @@ def test_it_is_unbiased() -> None:
     assert np.abs(copies - expected).max() <= 1.0 / grid.size + 1e-9
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("place", [0, 3, 9])
 def test_one_hot(place: int) -> None:
     weights = np.zeros(10, np.float32)
@@ -89,6 +91,7 @@ def test_one_hot(place: int) -> None:
         assert (systematic(weights, 25, uniform) == place).all()
 
 
+@pytest.mark.interpreted
 def test_one_particle() -> None:
     assert systematic(np.ones(1, np.float32), 1, 0.3).tolist() == [0]
     assert systematic(np.ones(1, np.float32), 5, 1.0).tolist() == [0] * 5
@@ -109,6 +112,7 @@ def test_a_float32_sum_that_ends_below_one(uniform: float) -> None:
     assert np.bincount(ancestors).max() <= 2
 
 
+@pytest.mark.interpreted
 def test_what_rounding_leaves_goes_to_the_last_source_with_weight() -> None:
     """A total that the cumulative sum never reaches: the last positions go to no source of weight zero."""
     ancestors = np.zeros(100, np.int32)
@@ -141,6 +145,7 @@ def test_what_cannot_be_resampled_is_refused(
         systematic(np.array(weights, np.float32), count, uniform)
 
 
+@pytest.mark.interpreted
 @given(st.integers(1, 2000), st.integers(1, 700), st.integers(0, 5))
 @settings(deadline=None)
 def test_copies_are_dealt_to_the_blocks(count: int, largest: int, seed: int) -> None:

@@ -178,6 +178,7 @@ def test_sorted_uniforms_are_uniform() -> None:
 # ---- properties
 
 
+@pytest.mark.interpreted
 @everyone
 @given(weights=weight_lists, count=st.integers(1, 100), uniform=uniforms)
 @settings(max_examples=60, deadline=None)
@@ -193,6 +194,7 @@ def test_ancestors_ascend_and_have_weight(
     assert np.array_equal(ancestors, scheme(array.astype(np.float64), count, uniform))
 
 
+@pytest.mark.interpreted
 @given(weight_lists, st.integers(1, 200), uniforms)
 @settings(max_examples=100, deadline=None)
 def test_copies_keep_to_their_bounds(weights: list[float], count: int, uniform: float) -> None:
@@ -204,6 +206,7 @@ def test_copies_keep_to_their_bounds(weights: list[float], count: int, uniform: 
     assert (certain >= np.floor(expected - 1e-9)).all()
 
 
+@pytest.mark.interpreted
 @given(weight_lists, st.integers(1, 200), uniforms, st.integers(1, 5), st.integers(0, 99))
 @settings(max_examples=150, deadline=None)
 def test_every_hypothesis_gets_its_share(
@@ -242,6 +245,7 @@ def test_equal_weights_lose_a_third_by_independent_draws() -> None:
 # ---- what breaks resamplers
 
 
+@pytest.mark.interpreted
 @everyone
 @pytest.mark.parametrize("place", [0, 3, 9])
 def test_one_hot(scheme: Resampler, place: int) -> None:

@@ -50,6 +50,7 @@ def test_weights_count_as_copies_do() -> None:
     np.testing.assert_allclose(one.nodes.mass, other.nodes.mass, atol=1e-12)
 
 
+@pytest.mark.interpreted
 def test_the_leaf_of_a_point_is_found_as_by_linear_search(tree: DensityTree) -> None:
     points = np.random.default_rng(3).uniform([-9.0, -9.0], [9.0, 9.0], (500, 2))
     low, high, mass = tree.leaf_boxes

@@ -20,6 +20,7 @@ def masses(sides: Sides, boxes: Boxes, sigma: float, bound: float) -> np.ndarray
     return nodes.mass[leaves]
 
 
+@pytest.mark.interpreted
 def test_more_nodes_than_there_was_room_for() -> None:
     """One box of a unit, cut to widths of 1/2048 m: some 4,096 nodes, where 1,028 are made room for."""
     leaves = masses(Sides([Side(0.0, 8.0, 1.0 / 2048.0)]), ONE, 0.0, 1e-4)
@@ -28,6 +29,7 @@ def test_more_nodes_than_there_was_room_for() -> None:
     np.testing.assert_allclose(inside, 1.0 / 2048.0, rtol=1e-9)
 
 
+@pytest.mark.interpreted
 def test_a_deeper_tree_than_there_was_room_for() -> None:
     """A needle in four dimensions of 2⁻⁷⁰: 280 cuts on the way down, where 256 are made room for."""
     sides = Sides([Side(0.0, 1.0, 2.0**-70)] * 4)

@@ -9,6 +9,8 @@ import pytest
 
 from filters.kernels import clusters
 
+pytestmark = pytest.mark.interpreted
+
 COUNT, SIZE, MANY = 700, 3, 4
 CIRCULAR = np.array([False, True, False])
 

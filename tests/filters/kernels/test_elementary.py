@@ -56,6 +56,7 @@ def test_sine_and_cosine(limit: float, tolerance: float) -> None:
     assert np.abs(out[1] - np.cos(x)).max() < tolerance
 
 
+@pytest.mark.interpreted
 def test_sine_and_cosine_are_exact_at_zero() -> None:
     out, _ = over(np.zeros(9), evaluate, 6)
     assert (out[0] == 0.0).all()
@@ -76,6 +77,7 @@ def test_exp_has_a_few_units_in_the_last_place() -> None:
     assert (np.abs(out[3] / exact - 1.0) < bound).all()
 
 
+@pytest.mark.interpreted
 def test_exp_is_zero_where_float32_ends() -> None:
     out, _ = over(np.array([-87.5, -1e4, -3e38, -np.inf]), evaluate, 6)
     assert (out[3] == 0.0).all()
@@ -119,6 +121,7 @@ def test_log_mixture(log_outlier: float) -> None:
     assert (np.abs(out - exact) < 3e-7 + 2e-7 * np.abs(exact)).all()
 
 
+@pytest.mark.interpreted
 def test_log_mixture_of_an_infinite_residual_is_the_outlier_part() -> None:
     out = np.zeros(1, np.float32)
     evaluate_mixture(np.array([np.inf], np.float32), np.float32(-0.05), np.float32(-3.0), out)
@@ -179,6 +182,7 @@ def test_ulps_of_sine_and_cosine() -> None:
     assert ulps(out[1][near], np.cos(x[near].astype(np.float64))) < 3.0
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize(
     ("row", "argument", "result"),
     [
@@ -196,6 +200,7 @@ def test_what_comes_out_at_the_ends(row: int, argument: float, result: float) ->
     assert out[row, 0] == np.float32(result)
 
 
+@pytest.mark.interpreted
 def test_sines_of_what_is_no_angle_are_no_numbers() -> None:
     out, _ = over(np.array([math.inf, -math.inf, math.nan]), evaluate, 6)
     assert not np.isfinite(out[:2]).any()
@@ -209,6 +214,7 @@ def test_huge_angles_lose_digits_slowly() -> None:
         assert np.abs(out[1] - np.cos(x)).max() < tolerance
 
 
+@pytest.mark.interpreted
 def test_log_of_nothing_is_the_least_there_is() -> None:
     """Zero and subnormal numbers: about -88, not minus infinity; log1p of a subnormal number is itself."""
     out, _ = over(np.array([0.0, 1e-40]), evaluate_positive, 2)

@@ -143,6 +143,7 @@ def test_radius_and_angle_are_independent() -> None:
     assert 5e-7 < stats.chisquare(counts.ravel()).pvalue < 1.0 - 5e-7
 
 
+@pytest.mark.interpreted
 def test_a_number_depends_on_the_particle_not_on_the_block() -> None:
     whole = draw(1, 0, 5, count=5000)
     parts = [draw(1, 0, 5, first=first, count=count) for first, count in [(0, 7), (7, 4093), (4100, 900)]]
@@ -158,6 +159,7 @@ def test_numbers_have_not_changed() -> None:
 FIRST = "ed53bc3d275bbe3fe159093f3e37173ff38fd03e50d6fbbe"
 
 
+@pytest.mark.interpreted
 def test_uniform_is_uniform_and_open() -> None:
     x = np.array([random.uniform(3, 1, step) for step in range(20_000)])
     assert x.min() > 0.0

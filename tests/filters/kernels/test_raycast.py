@@ -9,6 +9,8 @@ import pytest
 
 from filters.kernels.raycast import FREE, HIT, cast, mark, settle
 
+pytestmark = pytest.mark.interpreted
+
 ROWS, COLUMNS = 9, 13
 TOUCH = 1e-9
 

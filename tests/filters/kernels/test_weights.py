@@ -10,6 +10,8 @@ from scipy import special
 
 from filters.kernels import weights
 
+pytestmark = pytest.mark.interpreted
+
 
 def some(count: int, seed: int = 1) -> np.ndarray:
     return np.random.default_rng(seed).normal(-20.0, 8.0, count).astype(np.float32)

@@ -30,6 +30,7 @@ def some_particles(count: int, seed: int = 1) -> ParticleSet:
     return particles
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize(
     "control", [UnicycleControl(0.4, 0.3), UnicycleControl(-0.4, -3.0), UnicycleControl(0.0, 0.0)]
 )

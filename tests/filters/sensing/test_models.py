@@ -160,6 +160,7 @@ def columns(particles: ParticleSet) -> dict[str, NDArray[np.float64]]:
     return {name: particles.columns[row].astype(np.float64) for name, row in particles.rows.items()}
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("name", CASES)
 def test_log_likelihood(name: str, particles: ParticleSet) -> None:
     case = CASES[name]
@@ -174,6 +175,7 @@ def test_log_likelihood(name: str, particles: ParticleSet) -> None:
     assert (np.abs(got - expected) < 2e-5 + 1e-4 * deviations + 1e-6 * deviations**2).all()
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("name", CASES)
 def test_only_the_block_is_weighed_and_nothing_above_the_constant(name: str, particles: ParticleSet) -> None:
     case = CASES[name]

@@ -100,6 +100,7 @@ def test_log_likelihood(outliers: float, width: float) -> None:
         assert np.isfinite(expected).all()
 
 
+@pytest.mark.interpreted
 def test_only_the_block_is_weighed_whatever_its_bounds() -> None:
     sensor, measurement = Scan(GEOMETRY, walls(), 0.3), ScanMeasurement.of(sectors())
     whole, parts = particles(), particles()
@@ -110,6 +111,7 @@ def test_only_the_block_is_weighed_whatever_its_bounds() -> None:
     assert not parts.log_weights[-7:].any()
 
 
+@pytest.mark.interpreted
 def test_beyond_the_map_only_an_outlier_is_left() -> None:
     """Far away in every direction, and NaN: the bound of the outlier part, for every hit."""
     sensor, measurement = Scan(GEOMETRY, walls(), 0.3, 0.1, 40.0), ScanMeasurement.of(sectors())
