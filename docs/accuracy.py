@@ -1,0 +1,163 @@
+"""Measure every recording that is there and write the table of accuracy.md: ``make accuracy`` (``SEEDS=20``).
+
+A row is one command, run as a user would; where its recording is absent, the row that stands in the page is kept.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "accuracy.md"
+DATA = Path("../shared/data")
+OUT = Path("out/accuracy")
+BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+HEAD = (
+    "recording",
+    "RMSE, m",
+    "worst, m",
+    "inside 95 %",
+    "NEES",
+    "EKF: RMSE, m",
+    "EKF: inside 95 %",
+    "tracking",
+    "speed",
+    "command",
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table.
+
+    Attributes
+    ----------
+    needs : tuple[Path, ...]
+        Files without which it cannot be measured.
+    command : tuple[str, ...]
+        What follows ``beliefd``.
+    prepare : callable
+        Makes what the command reads, before it.
+    """
+
+    name: str
+    needs: tuple[Path, ...]
+    command: tuple[str, ...]
+    prepare: Callable[[], None] = lambda: None
+
+
+def prepare_car() -> None:
+    """Write the car's receiver, blanked from 20 to 50 s, its truth and its configuration."""
+    spec = spec_from_file_location("car", ROOT / "tests" / "sitl" / "car.py")
+    assert spec is not None
+    assert spec.loader is not None
+    car = module_from_spec(spec)
+    spec.loader.exec_module(car)
+    recording = (ROOT / DATA / "comma2k19_seg40.candump.gz").resolve()
+    folder = ROOT / OUT
+    folder.mkdir(parents=True, exist_ok=True)
+    car.configuration(folder, recording)
+    car.truth(folder, recording)
+    car.gnss(folder, recording, (20.0, 50.0))
+
+
+def replayed(stem: str, ending: str = ".tlog") -> Row:
+    """Return the row of a recording with its facts beside it."""
+    log = DATA / (stem + ending)
+    return Row(stem, (log,), ("replay", str(log)))
+
+
+CAR = DATA / "comma2k19_seg40.candump.gz"
+CAR_FILES = (str(CAR), f"{OUT}/gnss.tlog", "--config", f"{OUT}/car.toml", "--truth", f"{OUT}/truth.csv")
+SITL = Path("tests/sitl/data")
+ROWS = (
+    Row("scenario `beacons`", (), ("scenario", "beacons")),
+    replayed("plaza2"),
+    *(replayed(f"uwb_{way}") for way in ("los_a1", "los_b3", "nlos_a1", "nlos_b3")),
+    Row("`comma2k19_seg40`, GNSS blanked from 20 to 50 s", (CAR,), ("replay", *CAR_FILES), prepare_car),
+    replayed("bcn_katwijk1", ".bin"),
+    replayed("ubc_mission1"),
+    replayed("sitl_rover"),
+    replayed("sitl_jam"),
+    *(
+        Row(f"{stem}, trimmed", (SITL / f"{stem}.tlog",), ("replay", str(SITL / f"{stem}.tlog")))
+        for stem in ("sitl_rover", "sitl_jam")
+    ),
+)
+
+
+def spread(summary: dict[str, Any], name: str, form: str, statistic: str | None = None) -> str:
+    """Return mean and standard deviation, or one statistic, of a figure; a dash where there is none."""
+    if name not in summary:
+        return "–"
+    values = summary[name]
+    if statistic is not None:
+        return form.format(values[statistic])
+    mean = form.format(values["mean"])
+    return mean if summary.get("seeds") == 1 else f"{mean} ± {form.format(values['sd'])}"
+
+
+def measured(row: Row, seeds: int) -> str:
+    """Run a row's command and return its line."""
+    row.prepare()
+    command = [str(Path(sys.executable).with_name("beliefd")), *row.command, "--seeds", str(seeds), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
+    shown = f"`beliefd {' '.join(row.command)} --seeds {seeds}`"
+    if done.returncode != 0:
+        said = " ".join(done.stderr.split()) or f"exit {done.returncode}"
+        return f"| {row.name} | {' | '.join('–' * 8)} | {shown}: {said[-120:]} |"
+    summary = json.loads(done.stdout)["summary"]
+    shadow = summary["shadow"] | {"seeds": seeds}
+    cells = (
+        row.name,
+        spread(summary, "rmse_m", "{:.3f}"),
+        spread(summary, "max_m", "{:.2f}", "max"),
+        spread(summary, "coverage_95", "{:.1%}"),
+        spread(summary, "nees_mean", "{:.2f}"),
+        spread(shadow, "rmse_m", "{:.3f}", "mean"),
+        spread(shadow, "coverage_95", "{:.1%}", "mean"),
+        f"{summary['health'].get('tracking', 0.0):.1%}",
+        "x" + spread(summary, "real_time_factor", "{:.0f}", "min"),
+        shown,
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def standing(text: str) -> dict[str, str]:
+    """Return the lines of the table that stands in the page, by their first cell."""
+    lines = text.split(BEGIN)[1].split(END)[0].splitlines()
+    return {line.split("|")[1].strip(): line for line in lines if line.startswith("|")}
+
+
+def main() -> None:
+    """Run as a program."""
+    parser = argparse.ArgumentParser(description="Write the table of docs/accuracy.md.")
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--only", default="", help="rows whose name holds this")
+    options = parser.parse_args()
+    text = PAGE.read_text(encoding="utf-8")
+    lines = standing(text)
+    for row in ROWS:
+        if options.only in row.name and all((ROOT / path).is_file() for path in row.needs):
+            print(row.name, flush=True)
+            lines[row.name] = measured(row, options.seeds)
+            PAGE.write_text(rewritten(text, lines), encoding="utf-8")
+
+
+def rewritten(text: str, lines: dict[str, str]) -> str:
+    """Return the page with its table made anew of ``lines``."""
+    head = f"| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}"
+    table = "\n".join([head, *(lines[row.name] for row in ROWS if row.name in lines)])
+    return f"{text.split(BEGIN)[0]}{BEGIN}\n{table}\n{END}{text.split(END)[1]}"
+
+
+if __name__ == "__main__":
+    main()
