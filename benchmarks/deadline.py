@@ -37,6 +37,9 @@ from service.estimate import Budget, Estimate, Sensors, Status
 
 ROOT = Path(__file__).parents[1]
 LOADS = ("idle", "stress", "link", "stopped")
+ORDINARY = ("idle", "stress")
+"""Loads that the matrix also measures without SCHED_FIFO."""
+
 CALM = 400
 """Messages per second of the vehicle where the link is not the load."""
 
@@ -98,7 +101,8 @@ def matrix(arguments: argparse.Namespace) -> None:
     """Run every load at every rate, and write the table."""
     outcomes: list[tuple[str, Outcome]] = []
     for priority in map(int, arguments.priorities.split(",")):
-        for load in arguments.loads.split(","):
+        loads = arguments.loads.split(",")
+        for load in loads if priority else [load for load in loads if load in ORDINARY]:
             for rate in map(float, arguments.rates.split(",")):
                 settings = vars(arguments) | {"rate": rate, "load": load, "priority": priority}
                 settings["flood"] = arguments.flood if load == "link" else CALM
@@ -141,7 +145,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--load", choices=LOADS, default="link")
     parser.add_argument("--matrix", action="store_true")
     parser.add_argument("--loads", default=",".join(LOADS), help="of the matrix")
-    parser.add_argument("--priorities", default="0,10", help="of the matrix: SCHED_FIFO, 0: ordinary")
+    parser.add_argument("--priorities", default="10,0", help="of the matrix: SCHED_FIFO, 0: ordinary")
     parser.add_argument("--rates", default="50,100,200", help="of the matrix")
     parser.add_argument("--send-to", type=int, default=0, help=argparse.SUPPRESS)
     return parser.parse_args()

@@ -280,7 +280,8 @@ def draw(rows: list[dict[str, str]]) -> None:
     mpl.rcParams.update(
         {"svg.hashsalt": "beliefd", "font.size": 11, "axes.spines.top": False, "axes.spines.right": False}
     )
-    figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(7.5, 5.6), constrained_layout=True)
+    figure, panels = plt.subplots(3, 1, sharex=True, figsize=(7.5, 7.0), constrained_layout=True)
+    above, below, used = panels
     looks = {
         "fixed": ("#d55e00", "o", "fixed count"),
         "budgeted": ("#0072b2", "s", f"budget, {BUDGET_MS:g} ms a tick"),
@@ -291,7 +292,7 @@ def draw(rows: list[dict[str, str]]) -> None:
             if row["kind"] == kind:
                 of_kind[int(row["asked"])].append(row)
         counts = sorted(of_kind)
-        for axes, name, scale in ((above, "rmse_m", 1.0), (below, "missed", 100.0)):
+        for axes, name, scale in ((above, "rmse_m", 1.0), (below, "missed", 100.0), (used, "particles", 1.0)):
             each = [[scale * float(row[name]) for row in of_kind[count]] for count in counts]
             middle = [median(values) for values in each]
             spread = [
@@ -301,12 +302,15 @@ def draw(rows: list[dict[str, str]]) -> None:
             axes.errorbar(counts, middle, yerr=spread, color=colour, marker=mark, label=label, capsize=3)
     above.set_xscale("log")
     above.set_yscale("log")
-    above.set_ylabel("error of what is published, m (RMS)")
-    below.set_ylabel("deadlines missed, %")
-    below.set_xlabel(f"particles asked for, {RATE:g} ticks per second")
+    above.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    above.set_ylabel("error of what is\npublished, m (RMS)")
+    below.set_ylabel("deadlines\nmissed, %")
+    used.set_yscale("log")
+    used.set_ylabel("particles used\n(median)")
+    used.set_xlabel(f"particles asked for, {RATE:g} ticks per second")
     below.set_ylim(-3, 103)
     above.legend(frameon=False, loc="upper left")
-    for axes in (above, below):
+    for axes in panels:
         axes.grid(visible=True, which="major", color="#dddddd", linewidth=0.7)
     figure.savefig(PICTURE, metadata={"Date": None})
     print(f"{PICTURE.relative_to(ROOT)}")
