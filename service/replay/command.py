@@ -97,7 +97,7 @@ def command(
         if report is not None:
             write_report(report, plan, runs)
     except (LogError, ReportError, DecisionLogError, ValueError, OSError) as error:
-        console.print(f"[red]{error}[/red]", highlight=False)
+        console.print(str(error), style="red", markup=False, highlight=False)
         return 1
     if as_json_object:
         print(as_json(runs))  # noqa: T201  the command's result

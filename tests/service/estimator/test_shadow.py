@@ -1,4 +1,4 @@
-"""The shadow beside the estimator: the same samples, a start once the heading is known, and no effect on the particles."""
+"""The shadow beside the estimator: the same samples, a start once the heading is known, no effect on the particles."""
 
 from __future__ import annotations
 
