@@ -224,3 +224,12 @@ def test_a_noise_that_is_not_positive_is_refused() -> None:
     with pytest.raises(np.linalg.LinAlgError):
         belief.correct([1.0], [[1.0]], [[0.0]])
     assert belief.mean.tolist() == [1.0]
+
+
+def test_a_gate_counts_only_what_was_measured() -> None:
+    """NIS 5 of one component: beyond 95 % of chi-square with one degree of freedom (3.8), not with three (7.8)."""
+    belief = KalmanFilter([0.0, 0.0, 0.0], np.eye(3))
+    told = belief.correct([math.nan, math.sqrt(10.0), math.nan], np.eye(3), np.eye(3), gate=0.95)
+    assert told.nis == pytest.approx(5.0)
+    assert not told.accepted
+    assert belief.mean.tolist() == [0.0, 0.0, 0.0]

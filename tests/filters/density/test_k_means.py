@@ -213,3 +213,11 @@ def test_columns_that_make_no_sense_are_refused() -> None:
         clusters.extract(columns, np.zeros(10, np.float32), 10)
     with pytest.raises(ValueError, match="finite"):
         clusters.extract(np.full((2, 10), np.nan, np.float32), weights, 10)
+
+
+def test_one_hump_is_one_hypothesis() -> None:
+    """Six sets of a thousand particles of one Gaussian: the evidence pays for no second component."""
+    for seed in range(6):
+        columns = np.random.default_rng(seed).normal(size=(2, 1000)).astype(np.float32)
+        found = Clusters((False, False)).extract(columns, np.ones(1000, np.float32), 1000)
+        assert len(found.weights) == 1
