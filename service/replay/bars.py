@@ -12,7 +12,7 @@ from service.replay.seeds import replay_seeds
 
 COLUMNS = (
     TextColumn("{task.description}"),
-    BarColumn(),
+    BarColumn(20),
     TextColumn("{task.percentage:3.0f} %"),
     TextColumn("{task.fields[done]}"),
     TextColumn("{task.fields[speed]}"),

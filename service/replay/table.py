@@ -28,7 +28,7 @@ SHADOW = "EKF"
 def show(runs: list[Run], console: Console, title: str) -> None:
     """Print a table of the runs, what became of the samples, and the spread over the seeds."""
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1))
-    table.add_column("seed", justify="right")
+    table.add_column("seed", justify="right", no_wrap=True)
     for _, heading, _ in FIGURES:
         table.add_column(heading, justify="right")
     table.add_column("speed", justify="right")
@@ -42,7 +42,7 @@ def show(runs: list[Run], console: Console, title: str) -> None:
         table.add_row(statistic, *_cells(_column(spread, statistic)), "")
     table.add_section()
     for statistic in statistics or ("mean",):
-        name = SHADOW if len(runs) == 1 else f"{SHADOW} {statistic}"
+        name = SHADOW if statistic == "mean" else f"{SHADOW} {statistic}"
         table.add_row(name, *_cells(_column(spread["shadow"], statistic)), "", style="dim")
     console.print(table)
     health: dict[str, float] = spread["health"]

@@ -58,8 +58,10 @@ def test_the_table_has_a_row_for_it(run: Run) -> None:
 
 def test_the_spread_over_seeds_holds_the_shadows(run: Run) -> None:
     out = io.StringIO()
-    show([run, run], Console(file=out, width=120), "beacons")
-    assert "EKF mean" in out.getvalue()
+    show([run, run], Console(file=out, width=80), "beacons")
+    first = [line[:9].split() for line in out.getvalue().splitlines()]
+    assert ["EKF"] in first
+    assert ["EKF", "max"] in first
     assert summary([run, run])["shadow"]["rmse_m"]["sd"] == 0.0  # pyright: ignore[reportIndexIssue]
 
 
