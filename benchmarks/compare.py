@@ -28,6 +28,9 @@ PACKAGES = ("numpy<2", "particles==0.4", "pfilter==0.2.5", "filterpy", "stonesou
 NAMES = ("beliefd", "numpy", "particles", "stonesoup", "pfilter", "filterpy")
 TITLES = {"numpy": "numpy float64", "stonesoup": "Stone Soup"}
 ROUND_SECONDS = 0.4
+WARM, FEWEST = 23, 10
+"""Steps before the rounds, which do not count; and the least of a round."""
+
 PICTURE = ROOT / "docs" / "performance-compare.svg"
 
 
@@ -61,9 +64,9 @@ class Contender:
         )  # fmt: skip
         self.costs: list[float] = []
         self.squares: list[float] = []
-        first = self.run(3)
-        self._steps = max(2, min(400, round(ROUND_SECONDS * 1e9 / first["ns"])))
-        self.run(max(2, min(50, self._steps)))
+        self.run(3)  # compiles, where it does
+        self.fitting = round(ROUND_SECONDS * 1e9 / self.run(WARM - 3)["ns"])
+        """Steps that a round of its own would hold."""
 
     def run(self, steps: int) -> dict[str, Any]:
         assert self._process.stdin is not None
@@ -72,8 +75,8 @@ class Contender:
         self._process.stdin.flush()
         return json.loads(self._process.stdout.readline())
 
-    def round(self) -> None:
-        done = self.run(self._steps)
+    def round(self, steps: int) -> None:
+        done = self.run(steps)
         self.costs.append(done["ns"])
         self.squares += done["squares"]
 
@@ -85,9 +88,11 @@ class Contender:
 
 def compare(count: int, rounds: int) -> dict[str, dict[str, float]]:
     contenders = {name: Contender(name, count) for name in NAMES}
+    # the same steps for all: an error over others would be another error
+    steps = max(FEWEST, min(contender.fitting for contender in contenders.values()))
     for _ in range(rounds):
         for contender in contenders.values():
-            contender.round()
+            contender.round(steps)
     found: dict[str, dict[str, float]] = {}
     for name, contender in contenders.items():
         contender.end()

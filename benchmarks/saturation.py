@@ -163,10 +163,7 @@ class Simulation:
     def over(self) -> bool:
         now = time.monotonic_ns()
         while self.began + self._step * PERIOD_NS <= now:
-            with contextlib.suppress(BlockingIOError):  # a full queue: the driver would count what it loses
-                self._samples.outlet.send(
-                    encode(SampleBatch(self._said(self.began + self._step * PERIOD_NS)))
-                )
+            self.send(self._step, self.began + self._step * PERIOD_NS)
             self._step += 1
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -175,8 +172,12 @@ class Simulation:
                     self.published.append((now, datagram[1:]))
         return now >= self.began + self._seconds * 1e9
 
-    def _said(self, stamp: int) -> list[Sample]:
-        elapsed = self._step / RATE
+    def send(self, step: int, stamp: int) -> None:
+        """Send what the rover says in one step; a driver would count what a full queue refuses."""
+        with contextlib.suppress(BlockingIOError):
+            self._samples.outlet.send(encode(SampleBatch(self._said(step / RATE, stamp))))
+
+    def _said(self, elapsed: float, stamp: int) -> list[Sample]:
         north, east = truth(elapsed)
         noise = self._random.standard_normal(2 + len(BEACONS)).tolist()
         self._rolled += (SPEED + SPEED_SIGMA * math.sqrt(RATE) * noise[0]) / RATE
