@@ -7,6 +7,8 @@ import pytest
 
 from filters.kernels import moments
 
+pytestmark = pytest.mark.interpreted
+
 
 def test_sums_of_displaced_particles() -> None:
     rng = np.random.default_rng(5)
