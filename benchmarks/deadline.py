@@ -132,7 +132,7 @@ def table(outcomes: list[tuple[str, Outcome]], arguments: argparse.Namespace) ->
             f"| {late.median:.2f} | {late.p99:.2f} | {late.p999:.2f} | {late.worst:.2f} "
             f"| {middle:.0f} ({low:.0f} to {high:.0f}) | {levels} | {outcome.faults:.1f} |"
         )
-    return "\n".join([*lines, "", f"Machine: {machine()}. By `python benchmarks/deadline.py --matrix`."])
+    return "\n".join([*lines, "", f"Machine: {machine()}. By `benchmarks/deadline.py` (in `make bench`)."])
 
 
 def parse() -> argparse.Namespace:
