@@ -94,7 +94,7 @@ class Stage:
                 process.wait()
 
     def _start(self, name: str, *command: str) -> None:
-        with (self._folder / f"{name}.log").open("wb") as log:
+        with (self._folder / f"{name}.log").open("wb") as log, _uninterrupted():
             # A session of its own: Ctrl-C in the terminal reaches only us, and we stop things in order.
             self._running[name] = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
@@ -156,6 +156,19 @@ def stage(scenario: str, seed: int) -> Generator[Stage]:
 def warm() -> int:
     """Compile the kernels that are not cached yet, showing the progress; return the exit status."""
     return subprocess.run((*_COMMAND, "warm"), check=False).returncode
+
+
+@contextlib.contextmanager
+def _uninterrupted() -> Generator[None]:
+    """Put Ctrl-C off: in the middle of a start it would leave a process that nobody knows of."""
+    interrupts: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if interrupts:
+        raise KeyboardInterrupt
 
 
 def _free_udp_port() -> int:
