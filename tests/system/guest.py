@@ -78,7 +78,8 @@ def write_configuration() -> None:
     )  # fmt: skip
     tables = re.split(r"\n(?=\[)", ROBOT.read_text())
     tables = ['[start]\nmode = "first_fix"\n' if table.startswith("[start]") else table for table in tables]
-    loop = f"[loop]\nrate = 5.0\npriority = {PRIORITY}\n[budget]\nparticles_max = 20_000\n"
+    # a tick that does nothing costs 25 ms here
+    loop = f"[loop]\nrate = 5.0\npriority = {PRIORITY}\n[budget]\ncpu_ms = 100.0\nparticles_max = 5_000\n"
     ROBOT.write_text("\n".join([*tables, loop]))
 
 
