@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from math import inf, isfinite
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
@@ -121,6 +122,10 @@ class ParticleFilter(Generic[Control]):
         self._stride = 1
         self._sums = np.zeros((most_blocks, 2))
         self._moment_sums = MomentSums(self._particles, self._weights, self._centre, most_blocks)
+        self._normal_pairs = random.normal_pairs.direct  # four times a step: worth looking up once
+        self._log_sum_of = weights.log_sum.direct
+        self._normalize = weights.normalize.direct
+        self._redraw = resampling.redraw.direct
         self._log_sum = 0.0
         self._total = self._squares = 0.0
         self._centre_values: dict[str, float] = {}
@@ -134,7 +139,8 @@ class ParticleFilter(Generic[Control]):
     @property
     def effective_sample_size(self) -> float:
         """1 / Σ w², the inverse of the variance that equation 4.36's weights have gathered."""
-        self._settle()
+        if self._weighed:
+            self.normalize()
         return self._total * self._total / self._squares
 
     def column(self, name: str) -> Float32Array:
@@ -217,18 +223,19 @@ class ParticleFilter(Generic[Control]):
         self._step += 1
         step = self._step & 0xFFFFFFFF
         due = self._walks.due(duration)
+        pairs = self._blocks.pairs
         if self._blocks.shared:
-            self._blocks.share(lambda part, first, last: self._move(part, first, last, step, move, due))
+            self._blocks.share(lambda part, first, last: self._move(part, pairs[first:last], step, move, due))
         else:
-            self._move(0, 0, self._blocks.number, step, move, due)
+            self._move(0, pairs, step, move, due)
 
     def _move(
-        self, part: int, first_block: int, last_block: int, step: int, move: object, due: Sequence[Walk]
+        self, part: int, pairs: Sequence[tuple[int, int]], step: int, move: object, due: Sequence[Walk]
     ) -> None:
         noise, particles = self._noises[part], self._particles
-        for first, last in self._blocks.pairs[first_block:last_block]:
+        for first, last in pairs:
             for key, row in self._keys:
-                random.normal_pairs.direct(first, last, step, key, noise, row)
+                self._normal_pairs(first, last, step, key, noise, row)
             self._motion.move(particles, first, last, noise, move)
             for walk in due:
                 walk.apply(particles, first, last, noise, step)
@@ -244,7 +251,8 @@ class ParticleFilter(Generic[Control]):
         ValueError
             The measurement is not finite; the weights are untouched then.
         """
-        if not all(map(math.isfinite, filter(None, measurement))):
+        # their sum tells sooner; it may overflow where they are finite all the same
+        if not isfinite(sum(filter(None, measurement))) and not all(map(isfinite, filter(None, measurement))):
             raise ValueError(f"{type(sensor).__name__}: a measurement must be finite, got {measurement}")
         if sensor.refusal(measurement) is not None:
             return _REFUSED
@@ -255,10 +263,13 @@ class ParticleFilter(Generic[Control]):
         else:
             constant = sensor.weigh(particles, 0, particles.count, measurement)
         before = self._log_sum
-        after = weights.log_sum.direct(particles.log_weights, self._sampled, self._stride, self._sample)
+        after = self._log_sum_of(particles.log_weights, self._sampled, self._stride, self._sample)
         self._log_sum = after
         self._weighed = True
-        return Evidence(constant + after - before if after > -math.inf else after, innovation, True)
+        # as the constructor makes it, without its call in Python
+        return tuple.__new__(
+            Evidence, (constant + after - before if after > -inf else after, innovation, True)
+        )
 
     def _share_weighing(self, sensor: Sensor[M], measurement: M) -> float:
         constants = [0.0] * self._blocks.threads
@@ -280,7 +291,7 @@ class ParticleFilter(Generic[Control]):
         if self._blocks.shared:
             top, total, squares = self._share_normalizing()
         else:
-            top, total, squares = weights.normalize.direct(log_weights, self._weights, bounds, self._sums)
+            top, total, squares = self._normalize(log_weights, self._weights, bounds, self._sums)
         if not total > 0.0:
             self.collapses += 1
             self._level()
@@ -314,11 +325,13 @@ class ParticleFilter(Generic[Control]):
         The centre that innovations are measured from becomes the mean found here.
         """
         self._settle()
-        shift = STILL if displacement is None else displacement
-        given_path = self._motion.conditional_variances
-        moments = self._moment_sums.moments(shift, self._blocks, given_path, self.effective_sample_size)
         self._centre_values.clear()
-        return moments
+        return self._moment_sums.moments(
+            STILL if displacement is None else displacement,
+            self._blocks,
+            self._motion.conditional_variances,
+            self._total * self._total / self._squares,
+        )
 
     def resample(self, count: int | None = None, scheme: Resampler = systematic) -> None:
         """Lines 8 to 11: draw ``count`` particles, equally weighted; as many as now by default.
@@ -342,21 +355,29 @@ class ParticleFilter(Generic[Control]):
         if not 1 <= target <= self.capacity:
             raise ValueError(f"resample: count must lie in 1 to {self.capacity} (the capacity), got {target}")
         uniform = random.uniform(self._seed, _RESAMPLING_STREAM, self._draws + 1)
-        source, ancestors = self._weights[: self.count], self._ancestors[:target]
-        if scheme is systematic:  # whose checks these weights do not need
-            resampling.systematic(source, resampling.total(source), uniform, ancestors)
-        else:
-            scheme(source, target, uniform, ancestors)
+        sources, ancestors = self.count, self._ancestors[:target]
+        if scheme is not systematic:  # whose checks these weights do not need
+            scheme(self._weights[:sources], target, uniform, ancestors)
         self._draws += 1
         self._recount(target)
-        columns, spare, blocks = self._particles.columns, self._spare, self._blocks
-
-        def act(part: int, first: int, last: int) -> None:
-            resampling.deal(columns, spare, ancestors, blocks.bounds, first, last)
-
-        blocks.split(-(-target // resampling.RUN), ALIGNMENT, act)
-        self._particles.columns, self._spare = spare, columns
-        self._level()
+        particles, bounds = self._particles, self._blocks.bounds
+        columns, spare = particles.columns, self._spare
+        if scheme is systematic and not self._blocks.shared:
+            self._redraw(
+                columns, spare, self._weights, particles.log_weights, sources, ancestors, bounds, uniform
+            )
+            self._forget_sums()
+        else:
+            if scheme is systematic:
+                given = self._weights[:sources]
+                resampling.systematic(given, resampling.total(given), uniform, ancestors)
+            self._blocks.split(
+                -(-target // resampling.RUN),
+                ALIGNMENT,
+                lambda _, first, last: resampling.deal(columns, spare, ancestors, bounds, first, last),
+            )
+            self._level()
+        particles.columns, self._spare = spare, columns
 
     def inject(
         self, columns: Mapping[str, ArrayLike], count: int | None = None, scheme: Resampler = systematic
@@ -470,7 +491,11 @@ class ParticleFilter(Generic[Control]):
         count = self.count
         self._particles.log_weights[:count] = 0.0
         self._weights[:count] = 1.0
-        self._total = self._squares = float(count)
+        self._forget_sums()
+
+    def _forget_sums(self) -> None:
+        """Set the sums of weights that are all one."""
+        self._total = self._squares = float(self.count)
         self._log_sum = math.log(self._sampled)
         self._weighed = False
 

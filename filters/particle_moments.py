@@ -44,7 +44,7 @@ class MomentSums:
         size = len(particles.names)
         self._sums = np.zeros((most_blocks, kernels.SUMS + 2 * (size - _POSE)))
         self._reference = np.zeros(kernels.REFERENCE)
-        self._out = np.zeros(2 * size + _POSE * _POSE)
+        self._all = kernels.moments.direct
 
     def moments(
         self,
@@ -58,28 +58,36 @@ class MomentSums:
         The blocks are summed over in float32; ``given_path`` is what each marginalised column's variance is beyond
         the spread of its means.
         """
-        columns, weights, out = self._particles.columns, self._weights, self._out
+        columns, weights = self._particles.columns, self._weights
+        size = len(self._particles.names)
+        out = np.empty(2 * size + _POSE * _POSE)
         if blocks.shared:
-            self._shared(shift, blocks)
+            self._shared(shift, blocks, out)
         else:
-            kernels.moments.direct(
-                columns, weights, blocks.bounds, *shift, self._centre, self._reference, self._sums, out
+            forward, right, turn = shift
+            self._all(
+                columns,
+                weights,
+                blocks.bounds,
+                forward,
+                right,
+                turn,
+                self._centre,
+                self._reference,
+                self._sums,
+                out,
             )
-        size = len(columns)
-        out = out.copy()
         variance = out[size : 2 * size]
         for name, extra in given_path.items():
             if extra > 0.0:
                 variance[self._particles.rows[name]] += extra
-        return Moments(
-            self._particles.names,
-            out[:size],
-            out[2 * size :].reshape(_POSE, _POSE),
-            variance,
-            effective_sample_size,
+        covariance = out[2 * size :].reshape(_POSE, _POSE)
+        # as the constructor makes it, without its call in Python
+        return tuple.__new__(
+            Moments, (self._particles.names, out[:size], covariance, variance, effective_sample_size)
         )
 
-    def _shared(self, shift: Displacement, blocks: Blocks) -> None:
+    def _shared(self, shift: Displacement, blocks: Blocks, out: kernels.Float64Array) -> None:
         """Do the same with the work on the blocks divided among threads."""
         forward, right, _ = shift
         centre, reference, sums = self._centre, self._reference, self._sums
@@ -92,5 +100,5 @@ class MomentSums:
 
         kernels.displace_reference(centre, *shift, reference)
         blocks.share(add)
-        while not kernels.finish(blocks.number, forward, right, centre, reference, sums, self._out):
+        while not kernels.finish(blocks.number, forward, right, centre, reference, sums, out):
             blocks.share(add)

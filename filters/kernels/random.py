@@ -9,6 +9,7 @@ is kept: the same numbers come out in any order, from any block and any thread.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy import float32, int32, uint32
@@ -31,14 +32,19 @@ def mix(value: int) -> int:
     return value ^ (value >> 31)
 
 
+@lru_cache(maxsize=64)
+def _root(seed: int, stream: int) -> int:
+    return mix(mix(seed) ^ stream)
+
+
 def key(seed: int, stream: int) -> int:
     """The 32-bit key of one stream of one seed."""
-    return mix(mix(seed) ^ stream) >> 32
+    return _root(seed, stream) >> 32
 
 
 def uniform(seed: int, stream: int, step: int) -> float:
     """One number in (0, 1), for the draws that happen once a step."""
-    return ((mix(mix(mix(seed) ^ stream) ^ step) >> 12) + 0.5) * 2.0**-52
+    return ((mix(_root(seed, stream) ^ step) >> 12) + 0.5) * 2.0**-52
 
 
 @function

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy import float64, int64, uint32, uint64
+from numpy import float32, float64, int64, uint32, uint64
 from numpy.typing import NDArray
 
 from filters.kernels.compile import Float32Array, Int32Array, kernel
@@ -97,6 +97,29 @@ def deal(
             if block == blocks:
                 block = 0
                 position += RUN
+
+
+@kernel(
+    "void(float32[:, ::1], float32[:, ::1], float32[::1], float32[::1], int64, int32[::1], int64[::1], float64)",
+    exact=True,
+)
+def redraw(
+    source: Float32Array,
+    target: Float32Array,
+    weights: Float32Array,
+    log_weights: Float32Array,
+    count: int,
+    ancestors: Int32Array,
+    bounds: NDArray[np.int64],
+    uniform: float,
+) -> None:
+    """All of it in one call, for one thread: draw from ``count`` sources, deal the copies, make them weigh the same."""
+    given = weights[:count]
+    systematic(given, total(given), uniform, ancestors)
+    deal(source, target, ancestors, bounds, 0, (ancestors.size + RUN - 1) // RUN)
+    for i in range(ancestors.size):
+        weights[i] = float32(1.0)
+        log_weights[i] = float32(0.0)
 
 
 def block_sizes(count: int, largest: int) -> list[int]:

@@ -156,9 +156,10 @@ class Unicycle:
 
     def begin(self, control: UnicycleControl, duration: float) -> UnicycleStep:
         """Prepare one prediction and update the shared variances; see :class:`filters.motion.Motion`."""
-        if not all(map(math.isfinite, control)):
+        distance, turn, distance_sigma, turn_sigma = control
+        total = distance + turn + distance_sigma + turn_sigma  # a third of the time of looking at each
+        if not math.isfinite(total) and not all(map(math.isfinite, control)):
             raise ValueError(f"unicycle: every number of the control must be finite, got {control}")
-        distance, turn, _, _ = control
         bias_walk, scale_walk = self.gyro_bias_walk, self.odometry_scale_walk
         distance_variance, turn_variance = self.noise_variances(control, duration)
         bias_variance = self._bias_variance + bias_walk * bias_walk * duration
@@ -170,14 +171,10 @@ class Unicycle:
             self._bias_variance = bias_variance * turn_variance / turn_total
         if distance_total > 0.0:
             self._scale_variance = scale_variance * distance_variance / distance_total
-        return UnicycleStep(
-            distance,
-            turn,
-            duration,
-            distance_sigma,
-            turn_sigma,
-            -duration * bias_variance / turn_sigma if turn_total > 0.0 else 0.0,
-            distance * scale_variance / distance_sigma if distance_total > 0.0 else 0.0,
+        bias_gain = -duration * bias_variance / turn_sigma if turn_total > 0.0 else 0.0
+        scale_gain = distance * scale_variance / distance_sigma if distance_total > 0.0 else 0.0
+        return tuple.__new__(  # what the constructor does, without its call in Python
+            UnicycleStep, (distance, turn, duration, distance_sigma, turn_sigma, bias_gain, scale_gain)
         )
 
     def move(

@@ -68,4 +68,4 @@ class Walks:
 
     def due(self, duration: float) -> list[Walk]:
         """Gather ``duration`` seconds; say which pairs walk now."""
-        return [pair for pair in self._pairs if pair.due(duration)]
+        return [pair for pair in self._pairs if pair.due(duration)] if self._pairs else self._pairs

@@ -20,6 +20,7 @@ from filters.particle_set import ParticleSet
 from filters.sensing.robust import check, mixture, sigma_refusal
 
 _LOG_SQRT_TWO_PI = 0.5 * math.log(2.0 * math.pi)
+_ROOT_HALF = math.sqrt(0.5)
 
 
 class RangeMeasurement(NamedTuple):
@@ -84,12 +85,14 @@ class Range:
         self.longest = longest
         self.scale = scale
         self.bias = bias
+        self._plain = outliers == 0.0 and scale is None and bias is None
 
     def refusal(self, measurement: RangeMeasurement) -> str | None:
         """Refuse a distance not positive or longer than ``longest``, and a sigma that is not positive."""
-        if not 0.0 < measurement.distance <= self.longest:
-            return f"distance must lie in (0, {self.longest:g}] m, got {measurement.distance:g}"
-        return sigma_refusal(measurement.sigma)
+        distance, _, _, _, sigma = measurement
+        if not 0.0 < distance <= self.longest:
+            return f"distance must lie in (0, {self.longest:g}] m, got {distance:g}"
+        return None if sigma is None else sigma_refusal(sigma)
 
     def weigh(self, particles: ParticleSet, first: int, last: int, measurement: RangeMeasurement) -> float:
         """Add the log likelihood of a range; see :class:`filters.sensing.Sensor`."""
@@ -97,9 +100,9 @@ class Range:
         if sigma is None:
             sigma = self.sigma
         log_density = -math.log(sigma) - _LOG_SQRT_TWO_PI
-        gain = math.sqrt(0.5) / sigma
+        gain = _ROOT_HALF / sigma
         columns, log_weights = particles.columns, particles.log_weights
-        if self.outliers == 0.0 and self.scale is None and self.bias is None:
+        if self._plain:
             gaussian.direct(columns, log_weights, first, last, north, east, down * down, distance, gain)
             return log_density
         mixed = mixture(self.outliers, log_density, -math.log(self.span))
@@ -126,14 +129,13 @@ class Range:
 
     def innovation(self, centre: Mapping[str, float], measurement: RangeMeasurement) -> float:
         """Measured less expected distance at the centre, metres."""
-        north = centre["north"] - measurement.north
-        east = centre["east"] - measurement.east
-        expected = math.hypot(north, east, measurement.down_difference)
+        distance, north, east, down, _ = measurement
+        expected = math.hypot(centre["north"] - north, centre["east"] - east, down)
         if self.scale is not None:
             expected *= centre[self.scale]
         if self.bias is not None:
             expected += centre[self.bias]
-        return measurement.distance - expected
+        return distance - expected
 
 
 @kernel("void(float32[:, ::1], float32[::1], int64, int64, float32, float32, float32, float32, float32)")
