@@ -8,10 +8,9 @@ beyond the first of a kind see the same motion: used beside it they would count 
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Mapping
 
 from drivers.logs.dataflash.layout import DEGREE
+from drivers.logs.onboard import Fields, Handler, Notes
 from drivers.mavlink.inertial import KELVIN, LARGEST_FIELD, LARGEST_FORCE, LARGEST_RATE
 from drivers.sample import (
     AnyReading,
@@ -28,8 +27,6 @@ from drivers.sample import (
     Vector,
     Velocity,
 )
-
-Fields = Mapping[str, float]
 
 USUAL: dict[str, dict[str, float]] = {
     "ATT": {"Roll": DEGREE, "Pitch": DEGREE, "Yaw": DEGREE},
@@ -48,20 +45,6 @@ GOOD = 4  # RangeFinder::Status
 EKF_ORIGIN = 0
 MOST_BEACONS = 4
 DOWN = 25
-
-
-class Notes:
-    """What a handler counts beside its readings.
-
-    Attributes
-    ----------
-    malformed, unusable : Counter[str]
-        Broken fields; fields by which a sound message says that it has nothing usable: ``MESSAGE.field``.
-    """
-
-    def __init__(self) -> None:
-        self.malformed: Counter[str] = Counter()
-        self.unusable: Counter[str] = Counter()
 
 
 def _vector(fields: Fields, names: str, largest: float) -> Vector | None:
@@ -240,9 +223,6 @@ class _Tachometers:
             else:
                 notes.unusable[f"RPM.{name}"] += 1
         return readings
-
-
-Handler = Callable[[Fields, Notes], list[AnyReading]]
 
 
 def handlers() -> dict[str, Handler]:
