@@ -1,4 +1,4 @@
-"""The sections about the belief itself: vehicle, origin, start, area, motion, sensors, beacons, map."""
+"""The sections about the belief itself: vehicle, origin, start, area, motion, sensors, beacons, map, honesty."""
 
 from __future__ import annotations
 
@@ -206,3 +206,16 @@ class Map(Section):
     """Occupancy grid: ROS map .yaml with its .pgm or .png."""
     landmarks: str = ""
     """CSV of landmarks: id,north,east."""
+
+
+class Honesty(Section):
+    """What keeps the belief honest. Each can be switched off, to see what it is worth."""
+
+    hypotheses: bool = True
+    """Hold several hypotheses apart while the belief has several modes, and publish each."""
+    recovery: bool = True
+    """Notice that the belief is lost, and search for the place anew."""
+    trust: bool = True
+    """Flag a sensor that disagrees with all others, and ignore it until it has earned trust again."""
+    motion_mode: bool = True
+    """Tell standing still and slipping from moving, and treat the odometry accordingly."""
