@@ -44,7 +44,9 @@ class Population:
         How many the belief needs (KLD bound), as reckoned last.
     """
 
-    def __init__(self, configuration: Configuration, belief: ParticleFilter[Any], stopwatch: Stopwatch) -> None:
+    def __init__(
+        self, configuration: Configuration, belief: ParticleFilter[Any], stopwatch: Stopwatch
+    ) -> None:
         self._budget = configuration.budget
         self._belief = belief
         self._stopwatch = stopwatch
