@@ -2,7 +2,7 @@
 
 Fields come in SI units (:mod:`drivers.logs.dataflash.layout`); a field that a firmware does not log is absent. Units
 beyond the first of a kind see the same motion: used beside it they would count twice. The autopilot's own estimates
-(POS, XKF1, AHR2, …) are no sensors and are left alone.
+(POS, XKF1, AHR2, …) are no sensors and are left alone; of XKF0 only where the beacons stand is taken.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from drivers.mavlink.inertial import KELVIN, LARGEST_FIELD, LARGEST_FORCE, LARGE
 from drivers.sample import (
     AnyReading,
     Attitude,
+    BeaconPlace,
     Clearance,
     GeodeticPosition,
     Heading,
@@ -120,6 +121,25 @@ class _Beacons:
             self._last[beacon] = distance
             readings.append(Range(beacon, distance))
         return readings
+
+
+class _Surveyed:
+    """NKF0, XKF0: the beacon that the autopilot's filter looks at, with its place by its own survey.
+
+    North and east are the survey's; down has a shift in it that the filter estimates anew all the time and that all
+    beacons share. So each beacon is told once, as it was first logged: the differences of their heights are right.
+    """
+
+    def __init__(self) -> None:
+        self._told: set[int] = set()
+
+    def __call__(self, fields: Fields, _notes: Notes) -> list[AnyReading]:
+        beacon = int(fields["ID"])
+        if beacon in self._told:
+            return []
+        place = BeaconPlace(beacon, fields["BPN"], fields["BPE"], fields["BPD"])
+        self._told.add(beacon)
+        return [place]
 
 
 class _Receiver:
@@ -235,6 +255,8 @@ def handlers() -> dict[str, Handler]:
         "ATT": _att,
         "ORGN": _orgn,
         "BCN": _Beacons(),
+        "NKF0": _Surveyed(),
+        "XKF0": _Surveyed(),
         "GPS": first.fix,
         "GPA": first.accuracy,
         "GPS2": second.fix,
