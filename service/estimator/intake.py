@@ -13,7 +13,7 @@ from drivers.plausibility import implausible
 from drivers.sample import Origin, Sample
 from service.config import Configuration
 from service.estimate import SensorStatus
-from service.estimator.binding import BoundSensor
+from service.estimator.binding import BoundSensor, Surroundings
 from service.estimator.controls import Controls
 from service.estimator.records import SensorRecords
 from service.geodesy import Geodetic, LocalFrame
@@ -52,12 +52,12 @@ class Intake:
     """
 
     def __init__(self, configuration: Configuration, controls: Controls) -> None:
-        beacons = {beacon.id: beacon for beacon in configuration.beacon}
+        surroundings = Surroundings({beacon.id: beacon for beacon in configuration.beacon})
         self.records = SensorRecords()
         self.dropped: Counter[str] = Counter()
         self.frame = _configured_frame(configuration)
         self._controls = controls
-        self._sensors = [BoundSensor(sensor, beacons) for sensor in configuration.sensor]
+        self._sensors = [BoundSensor(sensor, surroundings) for sensor in configuration.sensor]
         self._timeline: Timeline[Waiting] = Timeline()
         self._heard: set[str] = set()
 
