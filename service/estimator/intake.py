@@ -103,14 +103,8 @@ class Intake:
 
     @property
     def missing(self) -> list[str]:
-        """What the belief waits for, in the user's words."""
-        distance, turn = self._controls.sources
-        absent = self._silent()
-        if distance is None:
-            absent.insert(0, "odometry")
-        if turn is None:
-            absent.insert(1 if distance is None else 0, "yaw rate")
-        return absent
+        """Which sensors were never heard, in the user's words."""
+        return self._silent()
 
     @property
     def drops(self) -> dict[str, int]:
