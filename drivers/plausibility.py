@@ -43,6 +43,10 @@ _LIMITS: dict[str, tuple[float, float]] = {
     "yaw": (-_TURN, _TURN),
     "heading": (-_TURN, _TURN),
     "beacon": (0, 2**31 - 1),
+    "landmark": (0, 2**31 - 1),
+    "bearing": (-_TURN, _TURN),
+    "sigma_distance": (_TINY, 1e6),
+    "sigma_bearing": (_TINY, 1e6),
     "orientation": (0, 255),
     "absolute": (1.0, 1e9),
     "differential": (-1e9, 1e9),
@@ -57,6 +61,7 @@ _LIMITS: dict[str, tuple[float, float]] = {
 }
 _DISTANCES: dict[str, tuple[float, float]] = {
     "range": (0.0, 1e6),
+    "range_bearing": (0.0, 1e6),
     "clearance": (0.0, 1e6),
     "odometer": (-1e9, 1e9),
 }

@@ -118,6 +118,33 @@ class Range(Reading, frozen=True, gc=False, tag="range"):
     altitude: float | None = None
 
 
+class BeaconPlace(Reading, frozen=True, gc=False, tag="beacon_place"):
+    """Where a beacon stands, metres north, east and down of the vehicle's origin, as its own system has it surveyed."""
+
+    beacon: int
+    north: float
+    east: float
+    down: float
+
+
+class Bearing(Reading, frozen=True, gc=False, tag="bearing"):
+    """Direction to a landmark, radians clockwise from the nose; ``landmark``: which one, where the sensor knows."""
+
+    bearing: float
+    landmark: int | None = None
+    sigma: float | None = None
+
+
+class RangeBearing(Reading, frozen=True, gc=False, tag="range_bearing"):
+    """Distance (metres) and direction (radians clockwise from the nose) of a landmark, known by its number or not."""
+
+    distance: float
+    bearing: float
+    landmark: int | None = None
+    sigma_distance: float | None = None
+    sigma_bearing: float | None = None
+
+
 class Clearance(Reading, frozen=True, gc=False, tag="clearance"):
     """A range finder, metres along its axis; ``orientation`` is the MAV_SENSOR_ORIENTATION (25: down)."""
 
@@ -190,6 +217,9 @@ AnyReading = (
     | Attitude
     | Heading
     | Range
+    | BeaconPlace
+    | Bearing
+    | RangeBearing
     | Clearance
     | Pressure
     | Altitude

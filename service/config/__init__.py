@@ -1,6 +1,6 @@
 """The configuration: one TOML file, checked as a whole, frozen once read."""
 
-from service.config.belief import Area, Beacon, Map, Motion, Origin, Sensor, Start, Vehicle
+from service.config.belief import Area, Beacon, Honesty, Map, Motion, Origin, Sensor, Start, Vehicle
 from service.config.complaints import ConfigurationError
 from service.config.configuration import Configuration, Site
 from service.config.links import CanLink, Link, MavlinkLink, ServoCalibration, Signal, ZenohLink
@@ -14,6 +14,7 @@ __all__ = [
     "CanLink",
     "Configuration",
     "ConfigurationError",
+    "Honesty",
     "Link",
     "Loop",
     "Map",

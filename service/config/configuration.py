@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from service.config.belief import Area, Beacon, Map, Motion, Origin, Sensor, Start, Vehicle
+from service.config.belief import Area, Beacon, Honesty, Map, Motion, Origin, Sensor, Start, Vehicle
 from service.config.links import Link
 from service.config.running import Budget, Loop, Publish, State
 from service.config.section import Section
@@ -41,6 +41,8 @@ class Sections(Section):
     """[[beacon]]"""
     map: Map = Map()
     """[map]"""
+    honesty: Honesty = Honesty()
+    """[honesty]"""
     publish: Publish = Publish()
     """[publish]"""
     state: State = State()

@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from drivers.sample import GeodeticPosition, Heading, LocalPosition, Range, Velocity
-from service.config import CanLink, Configuration, Link, MavlinkLink, Sensor, Site, Vehicle, load, site
+from drivers.sample import BeaconPlace, GeodeticPosition, Heading, LocalPosition, Range, Velocity
+from service.config import CanLink, Configuration, Link, MavlinkLink, Sensor, Site, Start, Vehicle, load, site
 from service.replay.sources import kind_of, merged, open_log
+from service.replay.surroundings import area_about, beacons_of
 
 SITL_GNSS_DELAY_MS = 90.0
 """ArduPilot's simulator reports a fix this long after it was true."""
@@ -80,7 +81,7 @@ def setting_of(logs: tuple[Path, ...], config: Path | None, truth: Path | None) 
     notes: list[str] = []
     path = config or beside(logs[0], ".toml")
     if path is None:
-        notes.append("no configuration: starting at the first position fix")
+        notes.append("no configuration: taken from the log alone")
         configuration = _filled(Site(), logs, notes)
     else:
         notes.append(f"configuration: {path}")
@@ -115,7 +116,7 @@ def _filled(partial: Site, logs: tuple[Path, ...], notes: list[str]) -> Configur
         if sensor.delay_ms:
             words += f", delay_ms = {sensor.delay_ms:.0f} (SIM_STATE seen: ArduPilot's simulator)"
         notes.append(words + ("".join(f', estimate = ["{state}"]' for state in sensor.estimate)))
-    filled = partial.configuration(vehicle, links, sensors)
+    filled = _placed(partial, partial.configuration(vehicle, links, sensors), contents, notes)
     if "loop" in partial.model_fields_set or contents.horizon_ms <= filled.loop.horizon_ms:
         return filled
     notes.append(
@@ -125,25 +126,62 @@ def _filled(partial: Site, logs: tuple[Path, ...], notes: list[str]) -> Configur
     return filled.model_copy(update={"loop": loop})
 
 
+def _placed(
+    partial: Site, configuration: Configuration, contents: Contents, notes: list[str]
+) -> Configuration:
+    """Fill in the beacons that the log knows, and where to begin when there are only ranges to begin from."""
+    if not configuration.beacon and contents.places:
+        configuration = configuration.model_copy(update={"beacon": beacons_of(contents.places)})
+        notes.append(f"{len(configuration.beacon)} beacons filled in from the log, heights from their mean")
+    given = {"start", "area"} & partial.model_fields_set
+    fixed = contents.heard & {GeodeticPosition, LocalPosition}
+    area = None if given or fixed else area_about(configuration.beacon, contents.ranges)
+    if area is None:
+        return configuration
+    (south, north), (west, east) = area.north, area.east
+    notes.append(
+        f"no start, no position fix: starting anywhere about the beacons, {north - south:.0f} by {east - west:.0f} m"
+    )
+    return configuration.model_copy(update={"area": area, "start": Start(mode="global")})
+
+
 class Contents(NamedTuple):
-    """What a pass over the logs tells: the kinds of reading, whether a simulator wrote them, how late they come."""
+    """What a pass over the logs tells: the kinds of reading, whether a simulator wrote them, how late they come.
+
+    Attributes
+    ----------
+    places : list[BeaconPlace]
+        What was said of the beacons' places.
+    ranges : list[float]
+        Every distance to a beacon that was heard, metres.
+    """
 
     heard: set[type]
     simulated: bool
     horizon_ms: float
+    places: list[BeaconPlace]
+    ranges: list[float]
 
 
 def _contents_of(configuration: Configuration, logs: tuple[Path, ...]) -> Contents:
     readers = [open_log(log, configuration) for log in logs]
     heard: set[type] = set()
     latencies: list[int] = []
+    places: dict[int, BeaconPlace] = {}
+    ranges: list[float] = []
     for sample in merged(readers):
-        kind = type(sample.reading)
+        reading = sample.reading
+        kind = type(reading)
         heard.add(kind)
+        if isinstance(reading, BeaconPlace):
+            places.setdefault(reading.beacon, reading)
+        elif isinstance(reading, Range):
+            ranges.append(reading.distance)
         if kind in _MEASURED:
             latencies.append(sample.received - sample.time)
     simulated = any("SIM_STATE" in reader.kinds() for reader in readers)
-    return Contents(heard, simulated, _horizon_for(latencies, SITL_GNSS_DELAY_MS if simulated else 0.0))
+    horizon_ms = _horizon_for(latencies, SITL_GNSS_DELAY_MS if simulated else 0.0)
+    return Contents(heard, simulated, horizon_ms, list(places.values()), ranges)
 
 
 def _horizon_for(latencies: list[int], delay_ms: float) -> float:

@@ -15,9 +15,9 @@ from pathlib import Path
 from statistics import median_low
 
 from drivers.logs.dataflash.layout import FMT, HEADER, HEADER_LENGTH, Layout, Layouts
-from drivers.logs.dataflash.records import FIX_3D, USUAL, Fields, Handler, Notes, handlers, source_of
+from drivers.logs.dataflash.records import FIX_3D, USUAL, handlers, source_of
+from drivers.logs.onboard import Fields, Handler, Tally
 from drivers.logs.receive_clock import LARGEST_STAMP, on_clock
-from drivers.plausibility import implausible
 from drivers.sample import LinkReport, Sample
 
 DEFINITIONS = frozenset({"FMT", "FMTU", "UNIT", "MULT"})
@@ -107,12 +107,8 @@ class DataflashReader:
 
     def _begin(self) -> None:
         self._log: Log | None = None
-        self._notes = Notes()
+        self._tally = Tally(self._link)
         self._handlers: dict[str, Handler] = handlers()
-        self._faults: Counter[str] = Counter()
-        self._messages = 0
-        self._samples = 0
-        self._ignored = 0
         self._on_gps_time = False
 
     @property
@@ -140,7 +136,7 @@ class DataflashReader:
             base = unix_at_boot(data)
             self._on_gps_time = base is not None
             self._log = Log(data)
-            for time, (layout, at) in on_clock(self._wanted(self._log, data), self._faults):
+            for time, (layout, at) in on_clock(self._wanted(self._log, data), self._tally.faults):
                 yield from self._samples_of(layout, data, at, time + (base or 0))
 
     def _wanted(self, log: Log, data: mmap.mmap) -> Iterator[tuple[int, tuple[Layout, int]]]:
@@ -148,7 +144,7 @@ class DataflashReader:
         for layout, at in log:
             stamp = layout.stamp(data, at) if layout.name in self._handlers else None
             if stamp is None:
-                self._ignored += 1
+                self._tally.ignored += 1
             else:
                 yield min(stamp, LARGEST_STAMP // 2), (layout, at)
 
@@ -157,37 +153,14 @@ class DataflashReader:
         fields = self._log.layouts.ready(layout).fields(data, at)
         source = source_of(layout.name, fields)
         if source is None:
-            self._ignored += 1
+            self._tally.ignored += 1
             return
-        self._messages += 1
-        try:
-            readings = self._handlers[source](fields, self._notes)
-        except (KeyError, ValueError, OverflowError) as error:  # a column is absent; a count is no number
-            missing = error.args[0] if isinstance(error, KeyError) else "value"
-            self._notes.malformed[f"{source}.{missing}"] += 1
-            return
-        for reading in readings:
-            wrong = implausible(reading)
-            if wrong is not None:
-                self._notes.malformed[f"{source}.{wrong}"] += 1
-                continue
-            self._samples += 1
-            yield Sample(time, time, self._link, source, reading)
+        yield from self._tally.samples_of(source, self._handlers[source], fields, time, time)
 
     def report(self) -> LinkReport:
         """Return the totals of the iteration so far."""
         damage = self._log.faults if self._log else Counter[str]()
-        return LinkReport(
-            self._link,
-            "up",
-            messages=self._messages,
-            samples=self._samples,
-            malformed=dict(damage + self._faults + self._notes.malformed),
-            unusable=dict(+self._notes.unusable),
-            ignored=self._ignored,
-            opened=1,
-            clock="gps" if self._on_gps_time else "boot",
-        )
+        return self._tally.report(damage, "gps" if self._on_gps_time else "boot")
 
     def kinds(self) -> dict[str, int]:
         """Return how many messages of each kind were met, wanted or not."""

@@ -2,20 +2,20 @@
 
 Fields come in SI units (:mod:`drivers.logs.dataflash.layout`); a field that a firmware does not log is absent. Units
 beyond the first of a kind see the same motion: used beside it they would count twice. The autopilot's own estimates
-(POS, XKF1, AHR2, …) are no sensors and are left alone.
+(POS, XKF1, AHR2, …) are no sensors and are left alone; of XKF0 only where the beacons stand is taken.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Mapping
 
 from drivers.logs.dataflash.layout import DEGREE
+from drivers.logs.onboard import Fields, Handler, Notes
 from drivers.mavlink.inertial import KELVIN, LARGEST_FIELD, LARGEST_FORCE, LARGEST_RATE
 from drivers.sample import (
     AnyReading,
     Attitude,
+    BeaconPlace,
     Clearance,
     GeodeticPosition,
     Heading,
@@ -28,8 +28,6 @@ from drivers.sample import (
     Vector,
     Velocity,
 )
-
-Fields = Mapping[str, float]
 
 USUAL: dict[str, dict[str, float]] = {
     "ATT": {"Roll": DEGREE, "Pitch": DEGREE, "Yaw": DEGREE},
@@ -48,20 +46,6 @@ GOOD = 4  # RangeFinder::Status
 EKF_ORIGIN = 0
 MOST_BEACONS = 4
 DOWN = 25
-
-
-class Notes:
-    """What a handler counts beside its readings.
-
-    Attributes
-    ----------
-    malformed, unusable : Counter[str]
-        Broken fields; fields by which a sound message says that it has nothing usable: ``MESSAGE.field``.
-    """
-
-    def __init__(self) -> None:
-        self.malformed: Counter[str] = Counter()
-        self.unusable: Counter[str] = Counter()
 
 
 def _vector(fields: Fields, names: str, largest: float) -> Vector | None:
@@ -137,6 +121,25 @@ class _Beacons:
             self._last[beacon] = distance
             readings.append(Range(beacon, distance))
         return readings
+
+
+class _Surveyed:
+    """NKF0, XKF0: the beacon that the autopilot's filter looks at, with its place by its own survey.
+
+    North and east are the survey's; down has a shift in it that the filter estimates anew all the time and that all
+    beacons share. So each beacon is told once, as it was first logged: the differences of their heights are right.
+    """
+
+    def __init__(self) -> None:
+        self._told: set[int] = set()
+
+    def __call__(self, fields: Fields, _notes: Notes) -> list[AnyReading]:
+        beacon = int(fields["ID"])
+        if beacon in self._told:
+            return []
+        place = BeaconPlace(beacon, fields["BPN"], fields["BPE"], fields["BPD"])
+        self._told.add(beacon)
+        return [place]
 
 
 class _Receiver:
@@ -242,9 +245,6 @@ class _Tachometers:
         return readings
 
 
-Handler = Callable[[Fields, Notes], list[AnyReading]]
-
-
 def handlers() -> dict[str, Handler]:
     """Return new handlers, by source: the message's name, and for the second receiver ``GPS2``."""
     first, second = _Receiver(), _Receiver()
@@ -255,6 +255,8 @@ def handlers() -> dict[str, Handler]:
         "ATT": _att,
         "ORGN": _orgn,
         "BCN": _Beacons(),
+        "NKF0": _Surveyed(),
+        "XKF0": _Surveyed(),
         "GPS": first.fix,
         "GPA": first.accuracy,
         "GPS2": second.fix,

@@ -17,10 +17,10 @@ from itertools import islice
 from pathlib import Path
 from statistics import median_low
 
+from drivers.logs.onboard import Fields, Handler, Tally
 from drivers.logs.receive_clock import LARGEST_STAMP, on_clock
 from drivers.logs.ulog.layout import Formats, Topic
-from drivers.logs.ulog.records import BLENDED, FIX_3D, RAW, Fields, Handler, Notes, handlers
-from drivers.plausibility import implausible
+from drivers.logs.ulog.records import BLENDED, FIX_3D, RAW, handlers
 from drivers.sample import LinkReport, Sample
 
 MAGIC = b"ULog\x01\x12\x35"
@@ -192,12 +192,8 @@ class UlogReader:
 
     def _begin(self) -> None:
         self._log: Log | None = None
-        self._notes = Notes()
+        self._tally = Tally(self._link)
         self._handlers: dict[tuple[str, int], Handler | None] = {}
-        self._faults: Counter[str] = Counter()
-        self._messages = 0
-        self._samples = 0
-        self._ignored = 0
         self._blended = False
         self._on_utc = False
 
@@ -226,14 +222,14 @@ class UlogReader:
             base, self._blended = unix_at_boot(data)
             self._on_utc = base is not None
             self._log = Log(data)
-            for time, (topic, fields) in on_clock(self._wanted(self._log), self._faults):
+            for time, (topic, fields) in on_clock(self._wanted(self._log), self._tally.faults):
                 yield from self._samples_of(topic, fields, time, base or 0)
 
     def _wanted(self, log: Log) -> Iterator[tuple[int, tuple[Topic, Fields]]]:
         """Yield the messages that have a handler, with their stamps."""
         for topic, body in log:
             if self._handler(topic) is None:
-                self._ignored += 1
+                self._tally.ignored += 1
                 continue
             fields = topic.fields(body)
             yield min(int(fields["timestamp"]), LARGEST_STAMP // 2), (topic, fields)
@@ -251,37 +247,15 @@ class UlogReader:
     def _samples_of(self, topic: Topic, fields: Fields, received: int, base: int) -> Iterator[Sample]:
         handler = self._handler(topic)
         assert handler is not None
-        self._messages += 1
-        try:
-            readings = handler(fields, self._notes)
-        except (KeyError, ValueError, OverflowError) as error:  # a field is absent; a count is no number
-            missing = error.args[0] if isinstance(error, KeyError) else "value"
-            self._notes.malformed[f"{topic.name}.{missing}"] += 1
-            return
         measured, stamp = int(fields.get("timestamp_sample", 0)), int(fields["timestamp"])
         age = (stamp - measured) * 1_000 if 0 < measured <= stamp else 0
-        for reading in readings:
-            wrong = implausible(reading)
-            if wrong is not None:
-                self._notes.malformed[f"{topic.name}.{wrong}"] += 1
-                continue
-            self._samples += 1
-            yield Sample(max(0, received - age) + base, received + base, self._link, topic.name, reading)
+        times = max(0, received - age) + base, received + base
+        yield from self._tally.samples_of(topic.name, handler, fields, *times)
 
     def report(self) -> LinkReport:
         """Return the totals of the iteration so far."""
         damage = self._log.faults if self._log else Counter[str]()
-        return LinkReport(
-            self._link,
-            "up",
-            messages=self._messages,
-            samples=self._samples,
-            malformed=dict(damage + self._faults + self._notes.malformed),
-            unusable=dict(+self._notes.unusable),
-            ignored=self._ignored,
-            opened=1,
-            clock="utc" if self._on_utc else "boot",
-        )
+        return self._tally.report(damage, "utc" if self._on_utc else "boot")
 
     def kinds(self) -> dict[str, int]:
         """Return how many messages of each topic were met, wanted or not."""

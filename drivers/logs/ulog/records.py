@@ -8,9 +8,8 @@ but for the attitude, as on MAVLink.
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Mapping
 
+from drivers.logs.onboard import Fields, Handler, Notes
 from drivers.mavlink.inertial import GAUSS, KELVIN, LARGEST_FIELD, LARGEST_FORCE, LARGEST_RATE
 from drivers.sample import (
     AnyReading,
@@ -27,19 +26,9 @@ from drivers.sample import (
     Velocity,
 )
 
-Fields = Mapping[str, float]
-
 FIX_2D, FIX_3D = 2, 3
 DEGREE = math.pi / 180.0
 RPM = math.tau / 60.0
-
-
-class Notes:
-    """What the handlers count: broken fields, and sound messages with nothing usable; ``topic.field``."""
-
-    def __init__(self) -> None:
-        self.malformed: Counter[str] = Counter()
-        self.unusable: Counter[str] = Counter()
 
 
 def _vector(fields: Fields, name: str, largest: float, factor: float = 1.0) -> Vector | None:
@@ -212,8 +201,6 @@ class _LocalOrigin:
         self._last = place
         return [Origin(place[0] * DEGREE, place[1] * DEGREE, place[2])]
 
-
-Handler = Callable[[Fields, Notes], list[AnyReading]]
 
 BLENDED, RAW = "vehicle_gps_position", "sensor_gps"
 

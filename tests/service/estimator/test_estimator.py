@@ -378,7 +378,7 @@ def test_memory_is_bounded_while_it_waits_for_a_fix() -> None:
     for k in range(0, 600 * 20, 20):
         estimator.ingest([s for j in range(20) for s in drive.controls((k + j) / 20)])
         estimator.tick(round((k + 20) / 20 * SECOND), 0, 100)
-    controls = estimator._controls
+    controls = estimator._vehicle.controls
     assert len(controls._turn._times) < 200
     assert len(controls._distance._times) < 200
 

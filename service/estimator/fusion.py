@@ -1,0 +1,165 @@
+"""The belief's own work: moved along by the controls, corrected by the measurements that the horizon has passed.
+
+It keeps the particles at the time of the last measurement, or within a stride of the horizon. Companions are told of
+every step.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from filters.particle import ParticleFilter
+from service.estimator.binding import Measurement, Place, Refusal
+from service.estimator.companion import Companion
+from service.estimator.course import Course, Level
+from service.estimator.intake import Intake, Passed, Waiting
+from service.estimator.population import Population
+from service.estimator.records import SensorRecord
+from service.estimator.stopwatch import Stopwatch
+from service.estimator.thinning import spaced
+from service.estimator.track import SECOND
+from service.estimator.vehicle import Vehicle
+from service.health import HealthMonitor
+
+STRIDE = SECOND // 10
+"""The belief is moved at each measurement, and at least this often: a chord of 0.1 s is still a good arc."""
+
+TOGETHER = SECOND // 1000
+"""Measurements within a millisecond are weighed at one time."""
+
+FEW = 8
+"""Up to a few measurements per tick are weighed each at its own time; more of them share four times."""
+
+OUTLIER = 0.5
+"""Probability of being the outlier part's from which a measurement counts as refused: it moved next to nothing."""
+
+
+class Fusion:
+    """Moves and weighs a belief.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        How it moves, and its height.
+    belief : ParticleFilter
+        What is moved and weighed.
+    population : Population
+        Who resamples it.
+    intake : Intake
+        Where each measurement's fate is recorded.
+    health : HealthMonitor
+        Told of every absolute measurement.
+    stopwatch : Stopwatch
+        Charged with motion and sensing.
+
+    Attributes
+    ----------
+    time : int or None
+        The belief's time, nanoseconds; ``None`` before it began.
+    companions : list[Companion]
+        Who is told of every step.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        belief: ParticleFilter[Any],
+        population: Population,
+        intake: Intake,
+        health: HealthMonitor,
+        stopwatch: Stopwatch,
+    ) -> None:
+        self.time: int | None = None
+        self.companions: list[Companion] = []
+        self._vehicle = vehicle
+        self._belief = belief
+        self._population = population
+        self._intake = intake
+        self._health = health
+        self._stopwatch = stopwatch
+
+    def begin(self, time: int) -> None:
+        """Begin, or begin anew, at ``time``: the particles were drawn for it."""
+        self.time = time
+        for companion in self.companions:
+            companion.started(time)
+        self._health.restart()
+
+    def fuse(self, passed: Passed, afforded: int, course: Course) -> None:
+        """Take the measurements of one tick in order, as far as the course goes."""
+        assert self.time is not None
+        fused = False
+        course.offered = len(passed)
+        passed = self._thinned(passed, course)
+        together = TOGETHER if len(passed) <= FEW else max(TOGETHER, (passed[-1][0] - passed[0][0]) // 4)
+        for index, (time, waiting) in enumerate(passed):
+            if not course.goes_on():
+                self._intake.leave_out(passed[index:], "cut")
+                break
+            if fused and time - self.time > together:
+                self._population.resample_if_worn(afforded)
+                fused = False
+            if not fused:
+                self.advance(time)
+            self._weigh(time, waiting)
+            fused = True
+        if fused:
+            self._population.resample_if_worn(afforded)
+
+    def keep_up(self, horizon: int) -> None:
+        """Move the belief to ``horizon`` where no measurement has brought it near."""
+        assert self.time is not None
+        if horizon - self.time >= STRIDE:
+            self.advance(horizon)
+
+    def advance(self, time: int) -> None:
+        """Predict the belief to ``time`` in strides (line 4 of Table 4.3)."""
+        assert self.time is not None
+        stride = max(STRIDE, (time - self.time) // 50)
+        while time > self.time:
+            step = min(time, self.time + stride)
+            self._vehicle.predict(self._belief, self.time, step)
+            for companion in self.companions:
+                companion.moved(self.time, step)
+            self.time = step
+        self._stopwatch.lap("motion")
+
+    def _thinned(self, passed: Passed, course: Course) -> Passed:
+        """Take as many measurements as the course has room for, and refuse the rest."""
+        if len(passed) <= course.most:
+            return passed
+        if course.level is Level.PREDICTION_ONLY:
+            self._intake.leave_out(passed, "prediction only")
+            return []
+        taken = set(spaced([waiting.sensor.name(waiting.sample) for _, waiting in passed], course.most))
+        self._intake.leave_out([item for index, item in enumerate(passed) if index not in taken], "thinned")
+        return [passed[index] for index in sorted(taken)]
+
+    def _weigh(self, time: int, waiting: Waiting) -> None:
+        """Weigh the particles by one measurement (line 5 of Table 4.3) and note what it said of the belief."""
+        place = Place(time, self._intake.frame, self._vehicle.down, self._vehicle.controls)
+        measured = waiting.sensor.measure(waiting.sample, place)
+        record = self._intake.records.of(measured.name)
+        if isinstance(measured, Refusal):
+            record.refused[measured.reason] += 1
+            return
+        self._vehicle.level(self._belief, waiting.sample.reading, self._intake.frame, measured.repeats)
+        self._take_evidence(time, measured, record)
+        self._stopwatch.lap("sensing")
+
+    def _take_evidence(self, time: int, measured: Measurement, record: SensorRecord) -> None:
+        evidence = self._belief.weigh(measured.model, measured.value)
+        if not evidence.accepted:
+            record.refused["invalid"] += 1
+            return
+        surprise = measured.surprise(evidence.log_mean)
+        for companion in self.companions:
+            companion.weighed(time, measured, evidence, surprise > OUTLIER)
+        record.innovation = evidence.innovation
+        record.last = time
+        if surprise > OUTLIER:
+            record.refused["outlier"] += 1
+        else:
+            record.accepted += 1
+        if measured.absolute:
+            self._health.measured(time, measured.name, surprise)

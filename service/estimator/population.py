@@ -1,0 +1,91 @@
+"""How many particles there are: what the belief demands, what the tick affords, and when they are drawn anew."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from filters.kld import Demand
+from filters.particle import ParticleFilter
+from filters.policy import EffectiveShare, Policy, Wear
+from service.config import Configuration
+from service.estimator.stopwatch import Stopwatch
+from service.estimator.track import SECOND
+
+RESAMPLING: Policy = EffectiveShare(0.5)
+"""When to resample: equation 4.36's effective sample size below half of the particles there are."""
+
+POSITION_BIN = 0.25
+HEADING_BIN = 0.1
+"""Sides of the bins that the KLD bound counts: metres and radians."""
+
+KLD_ERROR = 0.01
+"""Nats. The bins count the pose only; the slow states beside it want several particles in each of its bins."""
+
+DEMAND_INTERVAL = SECOND // 5
+GROWTH = 1.25
+"""The set grows between resamplings only if the demand is this much larger than the count."""
+
+
+class Population:
+    """The number of particles of a belief.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Its ``[budget]``.
+    belief : ParticleFilter
+        Whose particles they are.
+    stopwatch : Stopwatch
+        Charged with the resampling.
+
+    Attributes
+    ----------
+    demand : int
+        How many the belief needs (KLD bound), as reckoned last.
+    """
+
+    def __init__(
+        self, configuration: Configuration, belief: ParticleFilter[Any], stopwatch: Stopwatch
+    ) -> None:
+        self._budget = configuration.budget
+        self._belief = belief
+        self._stopwatch = stopwatch
+        self._demand_of = Demand(
+            POSITION_BIN,
+            HEADING_BIN,
+            error=KLD_ERROR,
+            minimum=self._budget.particles_min,
+            maximum=self._budget.particles_max,
+        )
+        self.demand = self._budget.particles_min
+        self._reckoned = -(2**62)
+
+    def clamp(self, wanted: int, afforded: int) -> int:
+        """Return the smaller of the two, within the configured bounds."""
+        return max(self._budget.particles_min, min(wanted, afforded, self._budget.particles_max))
+
+    def resample_if_worn(self, afforded: int) -> None:
+        """Normalise the weights, and draw anew where they differ too much (lines 8 to 11 of Table 4.3)."""
+        self._belief.normalize()
+        if RESAMPLING.due(Wear(self._belief.count, self._belief.effective_sample_size)):
+            self.resample(afforded)
+        self._stopwatch.lap("resampling")
+
+    def resample(self, afforded: int) -> None:
+        """Draw as many particles as are demanded and afforded."""
+        self._belief.resample(self.clamp(self.demand, afforded))
+
+    def fit(self, afforded: int) -> None:
+        """Shrink at once when the budget shrank; grow between resamplings only when the demand grew clearly."""
+        count, target = self._belief.count, self.clamp(self.demand, afforded)
+        if count > max(afforded, self._budget.particles_min) or target > GROWTH * count:
+            self._belief.normalize()
+            self.resample(afforded)
+            self._stopwatch.lap("resampling")
+
+    def reckon(self, now: int) -> None:
+        """Reckon the demand, if the last time is long enough ago."""
+        if now - self._reckoned >= DEMAND_INTERVAL:
+            self.demand = self._demand_of.particles(self._belief)
+            self._reckoned = now
+            self._stopwatch.lap("resampling")
