@@ -33,16 +33,14 @@ def process_covariance(distance: float, heading: float, noise: IntervalNoise) ->
     NDArray[np.float64], shape (3, 3)
     """
     cosine, sine = math.cos(heading), math.sin(heading)
-    rotation = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    q = noise.heading
-    local = np.array(
-        [
-            [noise.along, 0.0, 0.0],
-            [0.0, q * distance**2 / 3.0, q * distance / 2.0],
-            [0.0, q * distance / 2.0, q],
-        ]
-    )
-    return rotation @ local @ rotation.T
+    along, q = noise
+    across, with_heading = q * distance * distance / 3.0, q * distance / 2.0
+    # R L Rᵀ written out: a fifth of the time of small matrices
+    nn = along * cosine * cosine + across * sine * sine
+    ne = (along - across) * sine * cosine
+    ee = along * sine * sine + across * cosine * cosine
+    nh, eh = -with_heading * sine, with_heading * cosine
+    return np.array([[nn, ne, nh], [ne, ee, eh], [nh, eh, q]])
 
 
 class VelocityMoments(NamedTuple):

@@ -40,6 +40,7 @@ class Track:
         self._times: list[int] = []
         self._totals: list[float] = []
         self._unknown: list[float] = []
+        self._held_rate: tuple[float, int] | None = None
 
     @property
     def latest(self) -> int | None:
@@ -63,6 +64,7 @@ class Track:
         self._times.append(time)
         self._totals.append(self._totals[-1] + increment)
         self._unknown.append(self._unknown[-1] + unknown)
+        self._held_rate = None
         return True
 
     def forget(self, before: int) -> None:
@@ -70,6 +72,7 @@ class Track:
         keep = bisect_right(self._times, before) - 1
         if keep > 64:
             del self._times[:keep], self._totals[:keep], self._unknown[:keep]
+            self._held_rate = None
 
     def between(self, start: int, end: int) -> Motion:
         """Return the motion from ``start`` to ``end`` (nanoseconds), interpolated; beyond the last point, held."""
@@ -87,30 +90,30 @@ class Track:
         return self.between(time - half, time + half).total / (SPEED_WINDOW / SECOND)
 
     def _at(self, time: int) -> tuple[float, float]:
-        times = self._times
+        times, totals, unknown = self._times, self._totals, self._unknown
         if not times:
             return 0.0, time / SECOND
         if time >= times[-1]:
-            return self._held(time)
+            rate, longest = self._held_rate or self._hold()
+            beyond = time - times[-1]
+            held = min(beyond, longest)
+            return totals[-1] + rate * held, unknown[-1] + (beyond - held) / SECOND
         if time <= times[0]:
-            return self._totals[0], self._unknown[0] - (times[0] - time) / SECOND
+            return totals[0], unknown[0] - (times[0] - time) / SECOND
         after = bisect_right(times, time)
-        share = (time - times[after - 1]) / (times[after] - times[after - 1])
-        return (
-            self._totals[after - 1] + share * (self._totals[after] - self._totals[after - 1]),
-            self._unknown[after - 1] + share * (self._unknown[after] - self._unknown[after - 1]),
-        )
+        before = after - 1
+        share = (time - times[before]) / (times[after] - times[before])
+        total, gap = totals[before], unknown[before]
+        return total + share * (totals[after] - total), gap + share * (unknown[after] - gap)
 
-    def _held(self, time: int) -> tuple[float, float]:
-        """Extrapolate beyond the last point with the rate of the last tenth of a second, for at most ``GAP``."""
+    def _hold(self) -> tuple[float, int]:
+        """Note the rate of the last tenth of a second and for how long it holds beyond: ``GAP``, if it is known."""
         last = self._times[-1]
-        beyond = time - last
         first = max(0, bisect_left(self._times, last - SECOND // 10) - 1)
         span = last - self._times[first]
         known = span > 0 and span <= SECOND
-        held = min(beyond, GAP) if known else 0
-        rate = (self._totals[-1] - self._totals[first]) / span if known else 0.0
-        return self._totals[-1] + rate * held, self._unknown[-1] + (beyond - held) / SECOND
+        self._held_rate = ((self._totals[-1] - self._totals[first]) / span, GAP) if known else (0.0, 0)
+        return self._held_rate
 
 
 class RateTrack(Track):
