@@ -36,6 +36,7 @@ SensorKind = Literal[
     "speed",
 ]
 SlowState = Literal["scale", "bias", "delay"]
+Association = Literal["known", "unknown"]
 
 
 class Vehicle(Section):
@@ -177,6 +178,10 @@ class Sensor(Section):
     """What an estimated bias may be at the start, in the reading's unit (one standard deviation)."""
     declination_deg: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-180, le=180)] = 0.0
     """For a magnetic heading: degrees that magnetic north lies east of true north."""
+    sigma_bearing: Positive | None = None
+    """For range_bearing: standard deviation of the bearing, rad; sigma is that of the distance."""
+    association: Association = "known"
+    """Of landmarks: known, by the number that the reading says; unknown: any of the map, whatever it says."""
     beacons: tuple[Annotated[Whole, Field(ge=0, le=65535)], ...] | None = None
     """Only ranges to these beacons; without it: to every [[beacon]]."""
 
@@ -215,7 +220,7 @@ class Map(Section):
     occupancy: str = ""
     """Occupancy grid: ROS map .yaml with its .pgm or .png."""
     landmarks: str = ""
-    """CSV of landmarks: id,north,east."""
+    """Landmarks: CSV with a first line id,north,east, in metres."""
 
 
 class Honesty(Section):
