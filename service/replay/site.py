@@ -13,8 +13,32 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from drivers.sample import BeaconPlace, GeodeticPosition, Heading, LocalPosition, Range, Velocity
-from service.config import CanLink, Configuration, Link, MavlinkLink, Sensor, Site, Start, Vehicle, load, site
+from drivers.sample import (
+    BeaconPlace,
+    Bearing,
+    GeodeticPosition,
+    Heading,
+    LocalPosition,
+    MotionCommand,
+    Odometer,
+    Range,
+    RangeBearing,
+    Speed,
+    Velocity,
+)
+from service.config import (
+    CanLink,
+    Configuration,
+    Link,
+    MavlinkLink,
+    Sensor,
+    Site,
+    Start,
+    Vehicle,
+    ZenohLink,
+    load,
+    site,
+)
 from service.replay.sources import kind_of, merged, open_log
 from service.replay.surroundings import area_about, beacons_of
 
@@ -27,7 +51,21 @@ _KINDS: tuple[tuple[str, tuple[type, ...]], ...] = (
     ("range", (Range,)),
     ("heading", (Heading,)),
 )
-_MEASURED = frozenset(reading for _, readings in _KINDS for reading in readings)
+_SIGHTS: tuple[tuple[str, tuple[type, ...]], ...] = (
+    ("range_bearing", (RangeBearing,)),
+    ("bearing", (Bearing,)),
+)
+"""Of use only where there is a map of landmarks."""
+_MEASURED = frozenset(reading for _, readings in (*_KINDS, *_SIGHTS) for reading in readings)
+
+_ODOMETRY = frozenset({Odometer, Speed, MotionCommand})
+"""What tells how far the vehicle went; without any of it a motion model with a heading has nothing to go by."""
+
+_POINTING = frozenset({"velocity", "heading"})
+"""Kinds that speak of a heading, which a tag has not."""
+
+RADIO_BIAS = 0.03
+"""Metres; what the antenna delay of a calibrated ultra-wideband radio leaves in its ranges."""
 
 PROMPT = 0.97
 """Share of the measurements that a filled-in horizon waits for."""
@@ -102,15 +140,18 @@ def _read(path: Path, logs: tuple[Path, ...], notes: list[str]) -> Configuration
 
 def _filled(partial: Site, logs: tuple[Path, ...], notes: list[str]) -> Configuration:
     """Fill in what ``partial`` leaves out, from the logs themselves."""
-    vehicle = Vehicle(name="replay")
-    links = _links_of(logs)
+    vehicle, links = Vehicle(name="replay"), _links_of(logs)
     bare = partial.configuration(vehicle, links, ())
     if not partial.link:
         notes.extend(f'link filled in: "{link.name}" ({link.kind})' for link in links)
     if partial.sensor:
         return bare
     contents = _contents_of(bare, logs)
-    sensors = _sensors_of(contents)
+    if partial.vehicle is None and not contents.heard & _ODOMETRY:
+        vehicle = Vehicle(name="replay", motion="constant_velocity")
+        notes.append('motion = "constant_velocity" filled in: no odometry in the log')
+    free = (partial.vehicle or vehicle).motion == "constant_velocity"
+    sensors = _sensors_of(contents, _KINDS + _SIGHTS if partial.map.landmarks else _KINDS, free)
     for sensor in sensors:
         words = f"sensor filled in from the log: {sensor.kind}"
         if sensor.delay_ms:
@@ -199,16 +240,22 @@ def _links_of(logs: tuple[Path, ...]) -> tuple[Link, ...]:
         kind = kind_of(log).link
         if kind == "mavlink":
             links.setdefault(kind, MavlinkLink(name="autopilot", kind="mavlink", url=str(log)))
+        elif kind == "zenoh":
+            links.setdefault(kind, ZenohLink(name="samples", kind="zenoh"))
         else:
             links.setdefault(kind, CanLink(name="bus", kind="can", channel=str(log)))
     return tuple(links.values())
 
 
-def _sensors_of(contents: Contents) -> tuple[Sensor, ...]:
+def _sensors_of(
+    contents: Contents, kinds: tuple[tuple[str, tuple[type, ...]], ...], free: bool
+) -> tuple[Sensor, ...]:
     sensors: list[Sensor] = []
-    for kind, readings in _KINDS:
-        if contents.heard.intersection(readings):
+    for kind, readings in kinds:
+        if contents.heard.intersection(readings) and not (free and kind in _POINTING):
             delay = SITL_GNSS_DELAY_MS if contents.simulated and kind in ("position", "velocity") else 0.0
-            estimate = ("scale",) if kind == "range" else ()
-            sensors.append(Sensor.model_validate({"kind": kind, "delay_ms": delay, "estimate": estimate}))
+            facts: dict[str, object] = {"kind": kind, "delay_ms": delay}
+            if kind == "range":
+                facts |= {"estimate": ("bias",), "bias_sigma": RADIO_BIAS} if free else {"estimate": ("scale",)}
+            sensors.append(Sensor.model_validate(facts))
     return tuple(sensors)
