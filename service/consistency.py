@@ -24,8 +24,8 @@ def independent(series: NDArray[np.float64]) -> float:
     count = len(series)
     if count < 4:
         return float(max(1, count))
-    centred = series - series.mean()
-    variance = float(np.mean(centred**2))
+    centred: NDArray[np.float64] = series - float(series.mean())
+    variance = float(centred @ centred) / count
     if variance <= 0.0:
         return 1.0
     spectrum: NDArray[np.complex128] = np.fft.rfft(centred, 2 * count)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from service.score import Track, Truth, read_truth, score
+from service.mixture import Mixture
+from service.score import Track, Truth, compare, levels, read_truth, score
 
 
 def still_truth() -> Truth:
@@ -38,6 +41,39 @@ def test_gaussian_errors_are_covered_as_claimed() -> None:
     figures = score(Track(np.linspace(1, 99, count), errors[:, 0], errors[:, 1], covariance), still_truth())
     assert figures.coverage_95 == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / count))
     assert figures.nees_mean == pytest.approx(2.0, abs=4 * 2 / np.sqrt(count))
+    assert figures.coverage_50 == pytest.approx(0.5, abs=4 * np.sqrt(0.25 / count))
+    assert figures.coverage_99 == pytest.approx(0.99, abs=4 * np.sqrt(0.99 * 0.01 / count))
+    assert figures.nees_low is not None
+    assert figures.nees_high is not None
+    assert figures.nees_low < 2.0 < figures.nees_high
+    entropy = -np.log(2 * np.pi * np.e * np.sqrt(4.0 * 0.5 - 1.2**2))
+    assert figures.log_score == pytest.approx(entropy, abs=4 / np.sqrt(count))
+
+
+def test_the_levels_of_gaussian_errors_are_uniform() -> None:
+    """20,000 draws in 100 bins: chi-square of the counts below its 1 - 1e-4 quantile."""
+    random = np.random.default_rng(4)
+    count = 20_000
+    errors = random.multivariate_normal((0, 0), [[4.0, 1.2], [1.2, 0.5]], count)
+    track = Track(np.linspace(1, 99, count), errors[:, 0], errors[:, 1], np.tile([4.0, 1.2, 0.5], (count, 1)))
+    counts = np.array(levels(compare(track, still_truth())))
+    assert counts.sum() == count
+    assert np.sum((counts - 200.0) ** 2 / 200.0) < stats.chi2(99).ppf(1 - 1e-4)
+
+
+def test_a_row_of_several_hypotheses_is_scored_as_the_mixture() -> None:
+    """The truth lies in the lesser of two hypotheses 40 m apart, which the Gaussian of the leader does not know."""
+    mixture = Mixture(
+        np.array([0.6, 0.4]),
+        np.array([[0.0, 40.0], [0.0, 0.0]]),
+        np.array([[1.0, 0.0, 1.0], [1.0, 0.0, 1.0]]),
+    )
+    track = track_of(np.zeros(3), np.full(3, 40.0))
+    compared = compare(replace(track, mixtures={1: mixture}), still_truth())
+    assert compared.log_score[1] == pytest.approx(np.log(0.4 / (2 * np.pi)), abs=1e-9)
+    assert compared.log_score[0] == pytest.approx(-np.log(2 * np.pi) - 800.0)
+    assert compared.level[0] == 1.0
+    assert compared.level[1] < 0.7
 
 
 def test_truth_is_interpolated_and_nothing_is_scored_outside_of_it() -> None:
