@@ -23,7 +23,8 @@ from service.config import Configuration
 from service.estimate import Estimate, SensorStatus
 from service.estimator.companion import Companion
 from service.estimator.course import CROWD, Cause, Course, Level
-from service.estimator.fusion import Fusion
+from service.estimator.deputy import Deputy
+from service.estimator.fusion import KALMAN, Fusion
 from service.estimator.intake import Intake, Passed
 from service.estimator.output import Output
 from service.estimator.population import Population
@@ -90,6 +91,9 @@ class Estimator:
         if self._trust is not None:
             self._fusion.trust = self._trust
             self._fusion.companions.append(self._trust)
+        self._deputy = Deputy(self._vehicle, self._filter, seed)
+        self._fusion.deputy = self._deputy
+        self._fusion.companions.append(self._deputy)
         self._output = Output(self._vehicle, self._filter)
         self._sequence = 0
         self._freely = Course()
@@ -136,7 +140,7 @@ class Estimator:
         self._vehicle.controls.forget(oldest - SECOND)
         estimate = self._speak(now, unix, afforded, course)
         self._sequence += 1
-        self._stopwatch.lap("extraction")
+        self._stopwatch.lap(KALMAN if course.deputised else "extraction")
         return estimate
 
     def _begin(self, horizon: int, passed: Passed, afforded: int) -> Passed:
@@ -156,14 +160,25 @@ class Estimator:
 
     def _move(self, now: int, horizon: int, passed: Passed, afforded: int, course: Course) -> None:
         """Bring the belief to the horizon with all that was measured up to there."""
+        self._appoint(afforded, course)
         taken_back = self._fusion.taken_back
         self._fusion.fuse(passed, afforded, course)
         self._fusion.keep_up(horizon)
         self.reset_counter += self._fusion.taken_back - taken_back
         self._find(afforded)
+        if self._deputy.speaking:
+            return
         self._population.fit(afforded)
-        if course.level is not Level.PREDICTION_ONLY:
+        if not course.only_predicts:
             self._population.reckon(now)
+
+    def _appoint(self, afforded: int, course: Course) -> None:
+        """Have the Kalman filter stand in for the particles where the course wants it, and them take over after it."""
+        if course.level is Level.KALMAN and not self._search.blind:
+            course.deputised = self._deputy.take_over()
+        if self._deputy.speaking and not course.deputised:
+            self._deputy.hand_back(self._population.clamp(self.demand, afforded))
+            self._stopwatch.lap("resampling")
 
     def _find(self, afforded: int) -> None:
         """Let the search for the place go on, and begin anew where it has found one."""
@@ -182,7 +197,8 @@ class Estimator:
 
     def _speak(self, now: int, unix: int, afforded: int, course: Course) -> Estimate:
         time = self._fusion.time
-        pose = None if time is None else self._output.at(time, now)
+        speaker = self._deputy if self._deputy.speaking else self._output
+        pose = None if time is None else speaker.at(time, now)
         facts = Facts(
             now,
             time is not None,

@@ -256,6 +256,8 @@ def _sensors_of(
             delay = SITL_GNSS_DELAY_MS if contents.simulated and kind in ("position", "velocity") else 0.0
             facts: dict[str, object] = {"kind": kind, "delay_ms": delay}
             if kind == "range":
-                facts |= {"estimate": ("bias",), "bias_sigma": RADIO_BIAS} if free else {"estimate": ("scale",)}
+                facts |= (
+                    {"estimate": ("bias",), "bias_sigma": RADIO_BIAS} if free else {"estimate": ("scale",)}
+                )
             sensors.append(Sensor.model_validate(facts))
     return tuple(sensors)
