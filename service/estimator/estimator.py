@@ -24,6 +24,7 @@ from service.estimate import Estimate, SensorStatus
 from service.estimator.companion import Companion
 from service.estimator.course import CROWD, Cause, Course, Level
 from service.estimator.fusion import Fusion
+from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
 from service.estimator.output import Output
 from service.estimator.population import Population
@@ -90,7 +91,11 @@ class Estimator:
         if self._trust is not None:
             self._fusion.trust = self._trust
             self._fusion.companions.append(self._trust)
-        self._output = Output(self._vehicle, self._filter)
+        self._tracker = Tracker(self._filter) if configuration.honesty.hypotheses else None
+        if self._tracker is not None:
+            self._population.tracker = self._tracker
+            self._fusion.companions.append(self._tracker)
+        self._output = Output(self._vehicle, self._filter, self._tracker)
         self._sequence = 0
         self._freely = Course()
 
@@ -161,6 +166,9 @@ class Estimator:
         self._fusion.keep_up(horizon)
         self.reset_counter += self._fusion.taken_back - taken_back
         self._find(afforded)
+        if self._tracker is not None and course.level < Level.NO_CLOUD and not self._search.blind:
+            self._tracker.look(now)
+            self._stopwatch.lap("extraction")
         self._population.fit(afforded)
         if course.level is not Level.PREDICTION_ONLY:
             self._population.reckon(now)
@@ -192,6 +200,7 @@ class Estimator:
             self.configuration.budget.particles_min,
             now - self._intake.horizon,
             self._search.status,
+            "" if self._tracker is None else self._tracker.ambiguity(),
         )
         if pose is not None:
             self._search.published(pose.moments)
@@ -208,7 +217,7 @@ class Estimator:
             level_reason=course.reason(self.demand, afforded) if pose else "",
             demanded=self.demand,
             afforded=afforded,
-            reset_counter=self.reset_counter,
+            reset_counter=self.reset_counter + (0 if self._tracker is None else self._tracker.jumps),
         )
 
     @property

@@ -10,6 +10,8 @@ from filters.motion.constant_velocity import DOWN, VELOCITY_DOWN, VELOCITY_EAST,
 from filters.particle import ParticleFilter
 from service.estimate import Estimate, Triangle, Triple
 from service.estimator.carrier import Pose
+from service.estimator.hypotheses import Tracker
+from service.estimator.leading import Leading
 from service.estimator.vehicle import Vehicle
 from service.geodesy import LocalFrame
 
@@ -21,12 +23,17 @@ UNKNOWN_TRIANGLE: Triangle = (None, None, None, None, None, None)
 
 
 class Output:
-    """Carries moments from the belief's time to now and writes them down."""
+    """Carries moments from the belief's time to now and writes them down.
 
-    def __init__(self, vehicle: Vehicle, belief: ParticleFilter[Any]) -> None:
+    With a ``tracker`` they are the leading hypothesis's (:mod:`service.estimator.leading`).
+    """
+
+    def __init__(self, vehicle: Vehicle, belief: ParticleFilter[Any], tracker: Tracker | None = None) -> None:
         self._vehicle = vehicle
         self._belief = belief
-        self._carrier = vehicle.carrier(belief)
+        self._tracker = tracker
+        self._leading = None if tracker is None else Leading(belief, tracker)
+        self._carrier = vehicle.carrier(belief if self._leading is None else self._leading)
 
     @property
     def displacement(self) -> Displacement | None:
@@ -35,7 +42,8 @@ class Output:
 
     def at(self, belief_time: int, now: int) -> Pose:
         """Return the belief carried from ``belief_time`` to ``now`` (nanoseconds)."""
-        return self._carrier.at(belief_time, now)
+        pose = self._carrier.at(belief_time, now)
+        return pose if self._leading is None else self._leading.honest(pose, self._carrier.displacement)
 
     def estimate(self, pose: Pose | None, frame: LocalFrame | None, **figures: Any) -> Estimate:
         """Write ``pose`` down; ``figures`` are the fields of :class:`Estimate` that the belief does not know."""
@@ -73,7 +81,7 @@ class Output:
             longitude=longitude,
             altitude=altitude,
             radius95=pose.radius95,
-            hypotheses=1,
+            hypotheses=1 if self._tracker is None else self._tracker.count,
             particles=self._belief.count,
             effective_sample_size=pose.moments.effective_sample_size,
             biases=self._slow_states(pose.moments),

@@ -8,6 +8,7 @@ from filters.kld import Demand
 from filters.particle import ParticleFilter
 from filters.policy import EffectiveShare, Policy, Wear
 from service.config import Configuration
+from service.estimator.hypotheses import Tracker
 from service.estimator.stopwatch import Stopwatch
 from service.estimator.track import SECOND
 
@@ -41,7 +42,9 @@ class Population:
     Attributes
     ----------
     demand : int
-        How many the belief needs (KLD bound), as reckoned last.
+        How many the belief needs (KLD bound, and enough for each hypothesis), as reckoned last.
+    tracker : Tracker or None
+        Draws by hypothesis while there are several.
     """
 
     def __init__(
@@ -58,6 +61,7 @@ class Population:
             maximum=self._budget.particles_max,
         )
         self.demand = self._budget.particles_min
+        self.tracker: Tracker | None = None
         self._reckoned = -(2**62)
 
     def clamp(self, wanted: int, afforded: int) -> int:
@@ -73,7 +77,11 @@ class Population:
 
     def resample(self, afforded: int) -> None:
         """Draw as many particles as are demanded and afforded."""
-        self._belief.resample(self.clamp(self.demand, afforded))
+        count = self.clamp(self.demand, afforded)
+        if self.tracker is not None and self.tracker.divided:
+            self.tracker.draw(count)
+        else:
+            self._belief.resample(count)
 
     def fit(self, afforded: int) -> None:
         """Shrink at once when the budget shrank; grow between resamplings only when the demand grew clearly."""
@@ -86,6 +94,9 @@ class Population:
     def reckon(self, now: int) -> None:
         """Reckon the demand, if the last time is long enough ago."""
         if now - self._reckoned >= DEMAND_INTERVAL:
-            self.demand = self._demand_of.particles(self._belief)
+            demand = self._demand_of.particles(self._belief)
+            if self.tracker is not None:
+                demand = min(max(demand, self.tracker.demand), self._budget.particles_max)
+            self.demand = demand
             self._reckoned = now
             self._stopwatch.lap("resampling")
