@@ -47,25 +47,30 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
         Degradation of this tick: 0 full, 1 fewer particles than demanded, 2 measurements thinned, 3
         extraction beyond the Gaussian skipped, 4 the shadow Kalman filter speaks, 5 prediction only.
     position, velocity : Triple
-        North, east, down; m and m/s. ``null`` where unknown (all of it while ``waiting``).
+        North, east, down; m and m/s. ``null`` where unknown (all of it while ``waiting``). Of several hypotheses the
+        leading one's, never a mean between them; ``hypotheses`` has them all.
     heading : float or None
         Radians clockwise from true north, in (-pi, pi].
     position_covariance, velocity_covariance : Triangle
-        Upper triangle nn, ne, nd, ee, ed, dd; m² and (m/s)². Honest for the whole belief.
+        Upper triangle nn, ne, nd, ee, ed, dd; m² and (m/s)². Honest for the whole belief: the mean square of its
+        differences from ``position``, other hypotheses included.
     heading_variance : float or None
         rad²; circular, so at most (pi²)/3 for a heading that could be any.
     latitude, longitude, altitude : float or None
         WGS 84 degrees and metres above mean sea level; ``null`` without an origin.
     radius95 : float or None
-        Radius of the circle about ``position`` that holds the truth with 95 %, metres, horizontal.
+        Radius of the circle about ``position`` that holds the truth with 95 %, metres, horizontal: 95 % of the
+        whole belief, other hypotheses included.
     hypotheses : int
-        How many distinct places the belief holds; 0 while ``waiting``.
+        How many distinct places the belief holds; 0 while ``waiting``. Each has a weight of its own in the value of
+        ``hypotheses``.
     particles, demanded, afforded : int
         In use; needed by the belief's spread (KLD bound); affordable inside the budget.
     effective_sample_size : float or None
         Equation 4.36's inverse: 1 / sum of squared weights.
     reset_counter : int
-        Steps once when the position jumps for another reason than motion.
+        Steps once when the position jumps for another reason than motion: the belief began anew elsewhere, or another
+        hypothesis leads.
     biases : dict[str, tuple[float, float]]
         Slow states: name to value and sigma.
     level_reason : str
@@ -96,6 +101,49 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
     reset_counter: int
     biases: dict[str, tuple[float, float]]
     level_reason: str = ""
+
+
+class Hypothesis(msgspec.Struct, frozen=True, gc=False):
+    """One of the distinct places that the belief holds, predicted to the same time as the estimate.
+
+    Attributes
+    ----------
+    name : int
+        Which one: the same hypothesis keeps its name, whatever its weight. A name is never given again.
+    weight : float
+        Its share of the belief, 0 to 1.
+    position : Triple
+        Its own mean: north, east, down; m.
+    position_covariance : Triangle
+        Its own, about its own mean: upper triangle nn, ne, nd, ee, ed, dd; m².
+    heading, heading_variance : float or None
+        Its own; radians, rad².
+    """
+
+    name: int
+    weight: float
+    position: Triple
+    position_covariance: Triangle
+    heading: float | None
+    heading_variance: float | None
+
+
+class Hypotheses(msgspec.Struct, frozen=True, gc=False):
+    """The distinct places that the belief holds: modes of its density with a valley of little density between them.
+
+    Attributes
+    ----------
+    time : float
+        Of validity, Unix seconds.
+    hypotheses : list[Hypothesis]
+        One to eight: first the leader, whose position is that of the estimate, then by weight.
+    elsewhere : float
+        Share of the belief that belongs to none of them.
+    """
+
+    time: float
+    hypotheses: list[Hypothesis]
+    elsewhere: float = 0.0
 
 
 class Health(msgspec.Struct, frozen=True, gc=False):
@@ -419,7 +467,7 @@ class Cloud(msgspec.Struct, frozen=True, gc=False):
 
 def schema() -> dict[str, object]:
     """Return the JSON Schema of every value on the wire, by name (what ``@rpc/schema`` answers)."""
-    values = (Estimate, Budget, Sensors, Health, Status, Cloud)
+    values = (Estimate, Hypotheses, Budget, Sensors, Health, Status, Cloud)
     schemas, components = msgspec.json.schema_components(values, ref_template="#/$defs/{name}")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from drivers.sample import Sample
 from service.budget import Meters
-from service.channels import BUDGET, ESTIMATE, HEALTH, SENSORS, Heart, Outlet, cloud
+from service.channels import BUDGET, ESTIMATE, HEALTH, HYPOTHESES, SENSORS, Heart, Outlet, cloud
 from service.config import Configuration
 from service.debt import Debt
 from service.decisions import DecisionSender
-from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Sensors, SensorStatus
+from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Hypotheses, Sensors, SensorStatus
 from service.estimator.course import Course, Level
 from service.governor import CLOUD, PER_MEASUREMENT, Decision, Governor, Shape
 from service.inlet import Inlet
@@ -31,6 +31,7 @@ INGEST_SHARE = 0.5
 """Share of the budget that taking samples may use in one tick, all links together; the rest waits."""
 
 BEAT_RATE = 10.0
+HYPOTHESES_RATE = 10.0
 CLOUD_RATE = 5.0
 
 _OTHER = "other"
@@ -60,6 +61,10 @@ class Estimator(Protocol):
 
     def sensors(self, now_ns: int, /) -> list[SensorStatus]:
         """Return every sensor as the belief sees it."""
+        ...
+
+    def hypotheses(self, unix: float, /) -> Hypotheses | None:
+        """Return the places that the belief holds; ``None`` while it holds none."""
         ...
 
     def cloud(self, count: int, /) -> NDArray[np.float32]:
@@ -121,6 +126,7 @@ class Loop:
         self._slice_ns = round(INGEST_SHARE * self._budget_ms * 1e-3 * NANOSECONDS / slices)
         self._second = max(1, round(self._rate))
         self._beat_every = max(1, round(self._rate / BEAT_RATE))
+        self._hypotheses_every = max(1, round(self._rate / HYPOTHESES_RATE))
         self._cloud_every = max(1, round(self._rate / CLOUD_RATE))
         self._schedule = Schedule(self._rate, 0)
         self._encoder = msgspec.json.Encoder()
@@ -216,6 +222,10 @@ class Loop:
             self._send(BUDGET, self.budget(estimate))
         elif phase == self._second // 2:
             self._send(SENSORS, self.sensors(estimate.time, now_ns))
+        if self.ticks % self._hypotheses_every == 0 and estimate.level < Level.NO_CLOUD:
+            hypotheses = self._estimator.hypotheses(estimate.time)
+            if hypotheses is not None:
+                self._send(HYPOTHESES, hypotheses)
         if self.ticks % self._beat_every == 0 or self._course.rested:
             self._heart.beat()
 

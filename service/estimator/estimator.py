@@ -20,7 +20,7 @@ from filters.belief import Belief
 from filters.crew import Crew
 from filters.particle import ParticleFilter
 from service.config import Configuration
-from service.estimate import Estimate, SensorStatus
+from service.estimate import Estimate, Hypotheses, SensorStatus
 from service.estimator.companion import Companion
 from service.estimator.course import CROWD, Cause, Course, Level
 from service.estimator.fusion import Fusion
@@ -238,6 +238,10 @@ class Estimator:
     def sensors(self, now: int) -> list[SensorStatus]:
         """Return every sensor's status, heard or not; rates are over the time since the last call."""
         return self._intake.statuses(now, None if self._trust is None else self._trust.log_odds)
+
+    def hypotheses(self, unix: float) -> Hypotheses | None:
+        """Return the places that the belief held at the last tick, ``unix`` (s); ``None`` while it has none."""
+        return None if self._fusion.time is None else self._output.hypotheses(unix)
 
     def cloud(self, count: int) -> NDArray[np.float32]:
         """Return a fair sub-sample of the particles at the last tick: north, east, heading, weight; (count, 4)."""

@@ -93,6 +93,11 @@ class Tracker:
         return self._hypotheses.count
 
     @property
+    def leader(self) -> int:
+        """The name of the leading one."""
+        return self._hypotheses.leader
+
+    @property
     def demand(self) -> int:
         """How many particles they need; none beyond the belief's own if there is one."""
         return EACH * self.count if self.count > 1 else 0

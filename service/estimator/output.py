@@ -8,10 +8,11 @@ from typing import Any
 from filters.belief import Displacement, Moments
 from filters.motion.constant_velocity import DOWN, VELOCITY_DOWN, VELOCITY_EAST, VELOCITY_NORTH
 from filters.particle import ParticleFilter
-from service.estimate import Estimate, Triangle, Triple
+from service.estimate import Estimate, Hypotheses, Triangle, Triple
 from service.estimator.carrier import Pose
 from service.estimator.hypotheses import Tracker
 from service.estimator.leading import Leading
+from service.estimator.places import places
 from service.estimator.vehicle import Vehicle
 from service.geodesy import LocalFrame
 
@@ -32,6 +33,7 @@ class Output:
         self._vehicle = vehicle
         self._belief = belief
         self._tracker = tracker
+        self._pose: Pose | None = None
         self._leading = None if tracker is None else Leading(belief, tracker)
         self._carrier = vehicle.carrier(belief if self._leading is None else self._leading)
 
@@ -43,7 +45,18 @@ class Output:
     def at(self, belief_time: int, now: int) -> Pose:
         """Return the belief carried from ``belief_time`` to ``now`` (nanoseconds)."""
         pose = self._carrier.at(belief_time, now)
-        return pose if self._leading is None else self._leading.honest(pose, self._carrier.displacement)
+        if self._leading is not None:
+            pose = self._leading.honest(pose, self._carrier.displacement)
+        self._pose = pose
+        return pose
+
+    def hypotheses(self, unix: float) -> Hypotheses | None:
+        """Write the hypotheses of the last :meth:`at` down, with the Unix time (s) that it was for."""
+        if self._pose is None:
+            return None
+        found = [] if self._leading is None else self._leading.hypotheses
+        name = 1 if self._tracker is None else self._tracker.leader
+        return places(unix, self._pose, found, name)
 
     def estimate(self, pose: Pose | None, frame: LocalFrame | None, **figures: Any) -> Estimate:
         """Write ``pose`` down; ``figures`` are the fields of :class:`Estimate` that the belief does not know."""
