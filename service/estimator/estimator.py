@@ -19,7 +19,8 @@ from drivers.sample import Sample
 from filters.belief import Belief
 from filters.crew import Crew
 from filters.particle import ParticleFilter
-from service.config import Configuration
+from service.checkpoint import Kept
+from service.config import Configuration, Start
 from service.estimate import Estimate, Hypotheses, SensorStatus
 from service.estimator.companion import Companion
 from service.estimator.course import CROWD, Cause, Course, Level
@@ -28,6 +29,7 @@ from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
 from service.estimator.output import Output
 from service.estimator.population import Population
+from service.estimator.resuming import begin_again, kept_of
 from service.estimator.search import Search
 from service.estimator.start import Anchor, draw
 from service.estimator.starting import Starter
@@ -98,6 +100,8 @@ class Estimator:
         self._output = Output(self._vehicle, self._filter, self._tracker)
         self._sequence = 0
         self._freely = Course()
+        self._told: Start | None = None
+        self._spoken: Estimate | None = None
 
     def accompany(self, make: Callable[[Vehicle, Belief], C]) -> C:
         """Have a companion told of every call on the belief from now on, and return it."""
@@ -108,6 +112,47 @@ class Estimator:
     def ingest(self, samples: Iterable[Sample]) -> None:
         """Take samples as they arrive; whatever they hold, nothing is raised (:meth:`Intake.take`)."""
         self._intake.take(samples)
+
+    # --- beginning elsewhere ----------------------------------------------------------------------------------------
+
+    def kept(self) -> Kept | None:
+        """Return what a later process may go on from; ``None`` while the belief has no place."""
+        if self._fusion.time is None or self._search.blind:
+            return None
+        return kept_of(self._filter, self._fusion.time, self._vehicle, self._intake, self._spoken)
+
+    def resume(self, kept: Kept) -> None:
+        """Begin, before the first tick, with what another process kept: the way since then is unknown.
+
+        Raises
+        ------
+        ValueError
+            It is of a belief with other dimensions.
+        """
+        begin_again(kept, self._filter, self._vehicle, self._intake)
+        self._search.placed()
+        self._fusion.begin(kept.time)
+        self.reset_counter = kept.reset_counter
+
+    def reinitialize(self, start: Start) -> None:
+        """Begin anew at the next tick as ``start`` says; ``reset_counter`` steps."""
+        self.configuration = self.configuration.model_copy(update={"start": start})
+        self._starter = Starter(self.configuration, self._intake, self._vehicle.controls)
+        self._told = start
+
+    def _obey(self, horizon: int, afforded: int) -> None:
+        """Begin anew as was told since the last tick."""
+        start, self._told = self._told, None
+        if start is None:
+            return
+        self._search.told(self.configuration)
+        self.reset_counter += 1
+        if start.mode == "first_fix":
+            self._fusion.time = None
+            self.health.restart()
+        else:
+            anchor = None if start.position is None else Anchor(start.position, start.sigma)
+            self._start(horizon, anchor, afforded)
 
     # --- one tick -----------------------------------------------------------------------------------------------
 
@@ -133,13 +178,14 @@ class Estimator:
         passed = self._intake.release(horizon)
         self._stopwatch.lap("ingest")
         afforded = min(afforded, self._filter.capacity)
+        self._obey(horizon, afforded)
         if self._fusion.time is None:
             passed = self._begin(horizon, passed, afforded)
         if self._fusion.time is not None:
             self._move(now, horizon, passed, afforded, course)
         oldest = horizon if self._fusion.time is None else self._fusion.time
         self._vehicle.controls.forget(oldest - SECOND)
-        estimate = self._speak(now, unix, afforded, course)
+        estimate = self._spoken = self._speak(now, unix, afforded, course)
         self._sequence += 1
         self._stopwatch.lap("extraction")
         return estimate

@@ -67,6 +67,8 @@ CONFIG = "@rpc/config"
 SCHEMA = "@rpc/schema"
 QUERIES = (LATEST, STATUS, CONFIG, SCHEMA)
 
+REINITIALIZE = "@rpc/reinitialize"
+
 LIVE = "@live"
 
 
