@@ -135,6 +135,10 @@ class Motion(Section):
     """For constant_velocity: noise of the acceleration, m/s per √s: how fast the velocity wanders."""
     velocity_sigma: NotNegative = 1.0
     """For constant_velocity: what the velocity may be at the start, m/s on each axis (one standard deviation)."""
+    timing_sigma: NotNegative = 0.06
+    """For constant_velocity: how well the latency of the measurements is known, s; without odometry nothing tells it.
+
+    So many seconds of its way is the published region wider along the velocity."""
     dimensions: Literal[2, 3] = 2
     """For constant_velocity: 2 on the plane, 3 with down and its velocity."""
     vertical_noise: NotNegative | None = None

@@ -64,6 +64,9 @@ _ODOMETRY = frozenset({Odometer, Speed, MotionCommand})
 _POINTING = frozenset({"velocity", "heading"})
 """Kinds that speak of a heading, which a tag has not."""
 
+SHORTEST_HORIZON_MS = 50.0
+"""For a tag: no odometry bridges the way from the horizon to now, so waiting for nothing would cost accuracy."""
+
 RADIO_BIAS = 0.03
 """Metres; what the antenna delay of a calibrated ultra-wideband radio leaves in its ranges."""
 
@@ -158,12 +161,11 @@ def _filled(partial: Site, logs: tuple[Path, ...], notes: list[str]) -> Configur
             words += f", delay_ms = {sensor.delay_ms:.0f} (SIM_STATE seen: ArduPilot's simulator)"
         notes.append(words + ("".join(f', estimate = ["{state}"]' for state in sensor.estimate)))
     filled = _placed(partial, partial.configuration(vehicle, links, sensors), contents, notes)
-    if "loop" in partial.model_fields_set or contents.horizon_ms <= filled.loop.horizon_ms:
+    horizon_ms = max(contents.horizon_ms, SHORTEST_HORIZON_MS if free else filled.loop.horizon_ms)
+    if "loop" in partial.model_fields_set or horizon_ms == filled.loop.horizon_ms:
         return filled
-    notes.append(
-        f"horizon_ms = {contents.horizon_ms:.0f} filled in from the log: its measurements arrive that late"
-    )
-    loop = filled.loop.model_copy(update={"horizon_ms": contents.horizon_ms})
+    notes.append(f"horizon_ms = {horizon_ms:.0f} filled in from the log: its measurements arrive that late")
+    loop = filled.loop.model_copy(update={"horizon_ms": horizon_ms})
     return filled.model_copy(update={"loop": loop})
 
 
