@@ -6,6 +6,7 @@ it. The daemon asks it for moments, displaced from the delayed horizon to now.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -47,6 +48,14 @@ class Moments(NamedTuple):
     effective_sample_size: float
 
 
+class Joint(NamedTuple):
+    """Mean, (k,) float64, and covariance, (k, k) float64, of some of a belief's dimensions, in the order of names."""
+
+    names: tuple[str, ...]
+    mean: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+
 class Evidence(NamedTuple):
     """What a measurement said about the belief.
 
@@ -77,4 +86,8 @@ class Belief(Protocol):
 
     def moments(self, displacement: Displacement | None = None) -> Moments:
         """Say its moments, as they would be after a displacement."""
+        ...
+
+    def joint(self, names: Sequence[str]) -> Joint:
+        """Say mean and covariance of some dimensions together."""
         ...

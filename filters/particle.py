@@ -16,10 +16,11 @@ from typing import Any, Final, Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from filters.belief import STILL, Displacement, Evidence, Moments
+from filters.belief import STILL, Displacement, Evidence, Joint, Moments
 from filters.crew import ALIGNMENT, Blocks, Crew
 from filters.kernels import random, resampling, weights
 from filters.kernels.compile import Float32Array
+from filters.kernels.covariance import covariance
 from filters.kernels.regularization import shrink
 from filters.motion.model import Motion
 from filters.motion.slow import RandomWalk, diffuse
@@ -319,6 +320,27 @@ class ParticleFilter(Generic[Control]):
         moments = self._moment_sums.moments(shift, self._blocks, given_path, self.effective_sample_size)
         self._centre_values.clear()
         return moments
+
+    def joint(self, names: Sequence[str]) -> Joint:
+        """Weighted mean and covariance of some columns together; a heading among them is taken as a mere number.
+
+        The variance of a marginalised column is the spread of the particles' means and what their paths leave open.
+
+        Raises
+        ------
+        KeyError
+            There is no dimension of one of the names.
+        """
+        self._settle()
+        rows = np.array([self._particles.row(name) for name in names], np.int64)
+        reference = self._centre.columns[rows, 0].astype(np.float64)
+        found = Joint(tuple(names), np.zeros(rows.size), np.zeros((rows.size, rows.size)))
+        columns, weights = self._particles.columns, self._weights
+        covariance.direct(columns, weights, self.count, rows, reference, found.mean, found.covariance)
+        given_path = self._motion.conditional_variances
+        for place, name in enumerate(names):
+            found.covariance[place, place] += given_path.get(name, 0.0)
+        return found
 
     def resample(self, count: int | None = None, scheme: Resampler = systematic) -> None:
         """Lines 8 to 11: draw ``count`` particles, equally weighted; as many as now by default.

@@ -5,6 +5,8 @@ run on the same samples with the same parameters. What they leave out is the out
 """
 
 from filters.linearised.bearing import BearingMeasurement, LinearisedBearing
+from filters.linearised.constant_velocity import LinearisedConstantVelocity
+from filters.linearised.down import LinearisedDown
 from filters.linearised.heading import LinearisedHeading
 from filters.linearised.position import LinearisedPosition
 from filters.linearised.range import LinearisedRange
@@ -14,6 +16,8 @@ from filters.linearised.velocity import LinearisedVelocity
 __all__ = [
     "BearingMeasurement",
     "LinearisedBearing",
+    "LinearisedConstantVelocity",
+    "LinearisedDown",
     "LinearisedHeading",
     "LinearisedPosition",
     "LinearisedRange",

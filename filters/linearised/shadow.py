@@ -14,20 +14,26 @@ from typing import Any, cast
 
 import numpy as np
 
-from filters.belief import STILL, Displacement, Evidence, Moments
-from filters.extended_kalman import ExtendedKalmanFilter, LinearisedSensor
+from filters.belief import STILL, Displacement, Evidence, Joint, Moments
+from filters.extended_kalman import ExtendedKalmanFilter, LinearisedMotion, LinearisedSensor
 from filters.kalman import Matrix, symmetric
+from filters.linearised.constant_velocity import LinearisedConstantVelocity
+from filters.linearised.down import LinearisedDown
 from filters.linearised.heading import LinearisedHeading
 from filters.linearised.position import LinearisedPosition
 from filters.linearised.range import LinearisedRange
 from filters.linearised.unicycle import LinearisedUnicycle
 from filters.linearised.velocity import LinearisedVelocity
+from filters.motion.constant_velocity import ConstantVelocity
+from filters.motion.model import Motion
 from filters.motion.slow import RandomWalk
-from filters.motion.unicycle import Unicycle, UnicycleControl
+from filters.motion.unicycle import Unicycle
 from filters.sensing import Heading, Position, Range, Sensor, Velocity
+from filters.sensing.down import Down
 
 LINEARISED: Mapping[type, Callable[[Any], LinearisedSensor[Any]]] = MappingProxyType(
     {
+        Down: LinearisedDown,
         Heading: LinearisedHeading,
         Position: LinearisedPosition,
         Range: LinearisedRange,
@@ -36,16 +42,22 @@ LINEARISED: Mapping[type, Callable[[Any], LinearisedSensor[Any]]] = MappingProxy
 )
 """Which linearised model stands for which sensor model."""
 
+MOTIONS: Mapping[type, Callable[[Any, Sequence[RandomWalk]], LinearisedMotion[Any]]] = MappingProxyType(
+    {Unicycle: LinearisedUnicycle, ConstantVelocity: LinearisedConstantVelocity}
+)
+"""Which linearised model stands for which motion model."""
+
 _POSE = 3
 
 
 class ShadowFilter:
-    """An extended Kalman filter over a unicycle's pose, gyro bias, odometry scale and slow states.
+    """An extended Kalman filter over all the dimensions of a particle filter.
 
     Parameters
     ----------
-    motion : Unicycle
-        The particle filter's; its noises and walks are used, what it has learned is not touched.
+    motion : Motion
+        The particle filter's, one of :data:`MOTIONS`: its noises and walks are used, and what it
+        has learned is not touched.
     slow : sequence of RandomWalk
         Further states that only wander, as the particle filter has them.
     gate : float
@@ -59,15 +71,21 @@ class ShadowFilter:
     Raises
     ------
     ValueError
-        A gate outside (0, 1).
+        A gate outside (0, 1), or a motion model that has no linearised counterpart.
     """
 
-    def __init__(self, motion: Unicycle, slow: Sequence[RandomWalk] = (), gate: float = 0.999) -> None:
+    def __init__(
+        self, motion: Motion[Any, Any], slow: Sequence[RandomWalk] = (), gate: float = 0.999
+    ) -> None:
         if not 0.0 < gate < 1.0:
             raise ValueError(f"shadow filter: gate is a probability in (0, 1), got {gate}")
-        model = LinearisedUnicycle(motion, slow)
+        make = MOTIONS.get(type(motion))
+        if make is None:
+            known = ", ".join(kind.__name__ for kind in MOTIONS)
+            raise ValueError(f"shadow filter: {type(motion).__name__} is not among {known}")
+        model = make(motion, slow)
         size = len(model.names)
-        self._filter = ExtendedKalmanFilter[UnicycleControl](model, np.zeros(size), np.zeros((size, size)))
+        self._filter = ExtendedKalmanFilter[Any](model, np.zeros(size), np.zeros((size, size)))
         self._gate = gate
         self.rejections = 0
 
@@ -103,7 +121,7 @@ class ShadowFilter:
         self._filter.set(moments.mean, covariance)
         self.rejections = 0
 
-    def predict(self, control: UnicycleControl, duration: float) -> None:
+    def predict(self, control: Any, duration: float) -> None:
         """Move the belief; see :meth:`filters.particle.ParticleFilter.predict`."""
         self._filter.predict(control, duration)
 
@@ -152,3 +170,14 @@ class ShadowFilter:
         variance = np.diagonal(self._filter.covariance).copy()
         variance[:_POSE] = np.diagonal(pose)
         return Moments(self.names, mean, pose, variance, math.inf)
+
+    def joint(self, names: Sequence[str]) -> Joint:
+        """Mean and covariance of some dimensions together.
+
+        Raises
+        ------
+        KeyError
+            There is no dimension of one of the names.
+        """
+        rows = [self._filter.rows[name] for name in names]
+        return Joint(tuple(names), self._filter.mean[rows], self._filter.covariance[np.ix_(rows, rows)])

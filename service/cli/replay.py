@@ -17,6 +17,8 @@ beliefd replay flight.tlog --config robot.toml --out results/ [dim]· writes res
 
 beliefd replay flight.tlog --report flight.html [dim]· track, error, innovations, health: one page[/dim]
 
+beliefd replay car.log gnss.tlog --blank position:20-50 [dim]· how it coasts without fixes[/dim]
+
 beliefd replay plaza2.tlog --truth plaza2_truth.csv --seeds 20 --json
 """
 
@@ -61,6 +63,14 @@ def command(
             dir_okay=False,
         ),
     ] = None,
+    blank: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Take a sensor away for a time, by its kind or by who says it: position:20-50, GPS_RAW_INT:20-50 "
+            "(seconds since the log's begin). May be repeated.",
+            metavar="WHAT:FROM-TO",
+        ),
+    ] = None,
 ) -> None:
     """Replay recordings and print the error, the coverage and the health."""
     from service import kernels
@@ -68,4 +78,4 @@ def command(
     kernels.prepare()
     from service import replay
 
-    leave(replay.command(logs, config, truth, seeds, out, report, as_json, particles, decisions))
+    leave(replay.command(logs, config, truth, seeds, out, report, as_json, particles, decisions, blank or ()))

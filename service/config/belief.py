@@ -44,7 +44,7 @@ class Vehicle(Section):
     name: Name
     """Its name in every key: beliefd/v1/NAME/estimate."""
     motion: MotionModel = "unicycle"
-    """Motion model: unicycle for whatever drives with its nose ahead."""
+    """Motion model: unicycle for whatever drives with its nose ahead; constant_velocity for a tag without odometry."""
 
 
 class Origin(Section):
@@ -130,6 +130,16 @@ class Motion(Section):
     """Random walk of the odometry's scale, per √s."""
     odometry_scale_sigma: NotNegative = 0.02
     """What the odometry's scale may be off by at the start (one standard deviation; 0.02 is 2 %)."""
+    acceleration_noise: NotNegative = 0.7
+    """For constant_velocity: noise of the acceleration, m/s per √s: how fast the velocity wanders."""
+    velocity_sigma: NotNegative = 1.0
+    """For constant_velocity: what the velocity may be at the start, m/s on each axis (one standard deviation)."""
+    dimensions: Literal[2, 3] = 2
+    """For constant_velocity: 2 on the plane, 3 with down and its velocity."""
+    vertical_noise: NotNegative | None = None
+    """For constant_velocity in 3 dimensions: acceleration_noise of the vertical axis; without it the same."""
+    vertical_sigma: NotNegative | None = None
+    """For constant_velocity in 3 dimensions: velocity_sigma of the vertical axis; without it the same."""
     speed_from: Annotated[str, Field(min_length=1)] = "auto"
     """Source of the speed: a message name as the wire has it (WHEEL_DISTANCE, esc.Status, …) or auto."""
     yaw_rate_from: Annotated[str, Field(min_length=1)] = "auto"

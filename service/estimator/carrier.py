@@ -1,26 +1,43 @@
-"""The output predictor: a belief at the horizon, carried to now with the controls already received."""
+"""A belief carried from the horizon to now: what comes of it, and what an output predictor must offer."""
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from filters.belief import Belief, Displacement, Moments
-from filters.density.gaussian import radius
-from filters.motion.prediction import process_covariance
-from service.estimator.vehicle import Vehicle
+from filters.belief import Displacement, Moments
+from service.estimate import Triangle, Triple
 
 
 class Pose(NamedTuple):
-    """The belief at now: its moments, carried; ``covariance`` of (north, east, heading)."""
+    """The belief at now.
+
+    Attributes
+    ----------
+    moments : Moments
+        Carried.
+    covariance : (3, 3) float64
+        Of north, east and heading, with what the way from the horizon adds.
+    heading : tuple[float, float] or None
+        Heading (rad) and its variance; ``None`` for what has none.
+    down : tuple[float, float, float, float] or None
+        Down (m), its variance, and its covariances with north and east (m²); ``None`` while unknown.
+    velocity : Triple
+        North, east, down, m/s.
+    velocity_covariance : Triangle
+        Its upper triangle, (m/s)².
+    radius95 : float
+        Metres about the mean that hold the vehicle with a probability of 95 %.
+    """
 
     moments: Moments
     covariance: NDArray[np.float64]
-    speed: float
-    speed_variance: float
+    heading: tuple[float, float] | None
+    down: tuple[float, float, float, float] | None
+    velocity: Triple
+    velocity_covariance: Triangle
     radius95: float
 
     def mean(self, name: str) -> float:
@@ -28,8 +45,8 @@ class Pose(NamedTuple):
         return float(self.moments.mean[self.moments.names.index(name)])
 
 
-class Carrier:
-    """Carries a belief's moments from its own time to now.
+class Carrier(Protocol):
+    """Carries one belief's moments from its own time to now.
 
     Attributes
     ----------
@@ -37,29 +54,8 @@ class Carrier:
         Of the last :meth:`at`; the cloud is carried by the same.
     """
 
-    def __init__(self, vehicle: Vehicle, belief: Belief) -> None:
-        self._vehicle = vehicle
-        self._belief = belief
-        self._biases = (0.0, 1.0)
-        self.displacement: Displacement | None = None
+    displacement: Displacement | None
 
     def at(self, belief_time: int, now: int) -> Pose:
         """Return the belief carried from ``belief_time`` to ``now`` (nanoseconds)."""
-        displacement = self._vehicle.displacement(belief_time, now, self._biases)
-        moments = self._belief.moments(displacement)
-        index = moments.names.index
-        self._biases = (
-            float(moments.mean[index("gyro_bias")]),
-            float(moments.mean[index("odometry_scale")]),
-        )
-        distance = math.hypot(displacement.forward, displacement.right)
-        heading = float(moments.mean[index("heading")])
-        noise = self._vehicle.noise(belief_time, now)
-        covariance = moments.pose_covariance + process_covariance(
-            distance, heading - 0.5 * displacement.turn, noise
-        )
-        self.displacement = displacement
-        speed = self._vehicle.controls.speed(now) * self._biases[1]
-        return Pose(
-            moments, covariance, speed, self._vehicle.speed_variance(now), radius(covariance[:2, :2], 0.95)
-        )
+        ...

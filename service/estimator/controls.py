@@ -26,6 +26,7 @@ from drivers.sample import (
     Sample,
     Speed,
 )
+from service.config.belief import Motion as MotionSettings
 from service.estimator.track import (
     FASTEST,
     FASTEST_TURN,
@@ -291,3 +292,13 @@ class Controls:
         """Drop what lies before ``before`` (nanoseconds) and is no longer needed."""
         self._distance.forget(before)
         self._turn.forget(before)
+
+
+def controls_of(settings: MotionSettings) -> Controls:
+    """Return the controls that ``[motion]`` asks for."""
+    throttle = None
+    if settings.throttle_channel is not None:
+        throttle = Throttle(settings.throttle_channel, settings.throttle_speed)
+    return Controls(
+        settings.wheel_radius, settings.wheel_track, settings.speed_from, settings.yaw_rate_from, throttle
+    )

@@ -31,7 +31,7 @@ from service.estimator.start import Anchor, draw
 from service.estimator.starting import Starter
 from service.estimator.stopwatch import Silent, Stopwatch
 from service.estimator.track import SECOND
-from service.estimator.vehicle import Vehicle
+from service.estimator.vehicle import Vehicle, vehicle_of
 from service.health import Facts, HealthMonitor
 
 START_COUNT = 10_000
@@ -67,7 +67,7 @@ class Estimator:
         self.health = HealthMonitor()
         self.reset_counter = 0
         self._stopwatch: Stopwatch = stopwatch or Silent()
-        self._vehicle = Vehicle(configuration)
+        self._vehicle = vehicle_of(configuration)
         self._filter = ParticleFilter(
             self._vehicle.motion,
             capacity=configuration.budget.particles_max,
@@ -191,7 +191,7 @@ class Estimator:
     @property
     def missing(self) -> list[str]:
         """What the belief waits for, in the user's words."""
-        return self._intake.missing
+        return [*self._vehicle.missing, *self._intake.missing]
 
     @property
     def drops(self) -> dict[str, int]:

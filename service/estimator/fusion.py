@@ -143,7 +143,7 @@ class Fusion:
         if isinstance(measured, Refusal):
             record.refused[measured.reason] += 1
             return
-        self._vehicle.level(waiting.sample.reading, self._intake.frame, measured.repeats)
+        self._vehicle.level(self._belief, waiting.sample.reading, self._intake.frame, measured.repeats)
         self._take_evidence(time, measured, record)
         self._stopwatch.lap("sensing")
 

@@ -13,7 +13,7 @@ from drivers.plausibility import implausible
 from drivers.sample import Origin, Sample
 from service.config import Configuration
 from service.estimate import SensorStatus
-from service.estimator.binding import BoundSensor
+from service.estimator.binding import BoundSensor, Surroundings
 from service.estimator.controls import Controls
 from service.estimator.records import SensorRecords
 from service.geodesy import Geodetic, LocalFrame
@@ -52,12 +52,12 @@ class Intake:
     """
 
     def __init__(self, configuration: Configuration, controls: Controls) -> None:
-        beacons = {beacon.id: beacon for beacon in configuration.beacon}
+        surroundings = Surroundings({beacon.id: beacon for beacon in configuration.beacon})
         self.records = SensorRecords()
         self.dropped: Counter[str] = Counter()
         self.frame = _configured_frame(configuration)
         self._controls = controls
-        self._sensors = [BoundSensor(sensor, beacons) for sensor in configuration.sensor]
+        self._sensors = [BoundSensor(sensor, surroundings) for sensor in configuration.sensor]
         self._timeline: Timeline[Waiting] = Timeline()
         self._heard: set[str] = set()
 
@@ -103,14 +103,8 @@ class Intake:
 
     @property
     def missing(self) -> list[str]:
-        """What the belief waits for, in the user's words."""
-        distance, turn = self._controls.sources
-        absent = self._silent()
-        if distance is None:
-            absent.insert(0, "odometry")
-        if turn is None:
-            absent.insert(1 if distance is None else 0, "yaw rate")
-        return absent
+        """Which sensors were never heard, in the user's words."""
+        return self._silent()
 
     @property
     def drops(self) -> dict[str, int]:

@@ -6,13 +6,15 @@ import math
 from typing import Any
 
 from filters.belief import Displacement, Moments
-from filters.motion.prediction import velocity_moments
-from filters.motion.unicycle import UnicycleControl
+from filters.motion.constant_velocity import DOWN, VELOCITY_DOWN, VELOCITY_EAST, VELOCITY_NORTH
 from filters.particle import ParticleFilter
 from service.estimate import Estimate, Triangle, Triple
-from service.estimator.carrier import Carrier, Pose
+from service.estimator.carrier import Pose
 from service.estimator.vehicle import Vehicle
 from service.geodesy import LocalFrame
+
+PUBLISHED = frozenset({"north", "east", "heading", DOWN, VELOCITY_NORTH, VELOCITY_EAST, VELOCITY_DOWN})
+"""Dimensions that have fields of their own; the others are slow states."""
 
 UNKNOWN: Triple = (None, None, None)
 UNKNOWN_TRIANGLE: Triangle = (None, None, None, None, None, None)
@@ -21,10 +23,10 @@ UNKNOWN_TRIANGLE: Triangle = (None, None, None, None, None, None)
 class Output:
     """Carries moments from the belief's time to now and writes them down."""
 
-    def __init__(self, vehicle: Vehicle, belief: ParticleFilter[UnicycleControl]) -> None:
+    def __init__(self, vehicle: Vehicle, belief: ParticleFilter[Any]) -> None:
         self._vehicle = vehicle
         self._belief = belief
-        self._carrier = Carrier(vehicle, belief)
+        self._carrier = vehicle.carrier(belief)
 
     @property
     def displacement(self) -> Displacement | None:
@@ -55,25 +57,17 @@ class Output:
                 biases={},
                 **figures,
             )
-        north, east, heading = pose.mean("north"), pose.mean("east"), pose.mean("heading")
-        height = self._vehicle.height
+        north, east = pose.mean("north"), pose.mean("east")
         nn, ne, ee = (float(pose.covariance[i, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
-        heading_variance = float(pose.covariance[2, 2])
-        velocity = velocity_moments(pose.speed, pose.speed_variance, heading, heading_variance)
-        latitude, longitude, altitude = self._geodetic(frame, north, east, height)
+        down, dd, nd, ed = (None, None, None, None) if pose.down is None else pose.down
+        heading, heading_variance = (None, None) if pose.heading is None else pose.heading
+        latitude, longitude, altitude = self._geodetic(frame, north, east, down)
         return Estimate(
-            position=(north, east, None if height is None else height[0]),
-            velocity=(velocity.north, velocity.east, None),
+            position=(north, east, down),
+            velocity=pose.velocity,
             heading=heading,
-            position_covariance=(
-                nn,
-                ne,
-                None if height is None else 0.0,
-                ee,
-                None if height is None else 0.0,
-                None if height is None else height[1],
-            ),
-            velocity_covariance=(velocity.nn, velocity.ne, None, velocity.ee, None, None),
+            position_covariance=(nn, ne, nd, ee, ed, dd),
+            velocity_covariance=pose.velocity_covariance,
             heading_variance=heading_variance,
             latitude=latitude,
             longitude=longitude,
@@ -87,16 +81,14 @@ class Output:
         )
 
     @staticmethod
-    def _geodetic(
-        frame: LocalFrame | None, north: float, east: float, height: tuple[float, float] | None
-    ) -> Triple:
+    def _geodetic(frame: LocalFrame | None, north: float, east: float, down: float | None) -> Triple:
         if frame is None:
             return UNKNOWN
-        point = frame.geodetic_from_ned(north, east, 0.0 if height is None else height[0])
+        point = frame.geodetic_from_ned(north, east, 0.0 if down is None else down)
         return (
             math.degrees(point.latitude),
             math.degrees(point.longitude),
-            None if height is None else point.altitude,
+            None if down is None else point.altitude,
         )
 
     @staticmethod
@@ -104,5 +96,5 @@ class Output:
         return {
             name: (float(moments.mean[i]), math.sqrt(max(0.0, float(moments.variance[i]))))
             for i, name in enumerate(moments.names)
-            if name not in ("north", "east", "heading")
+            if name not in PUBLISHED
         }

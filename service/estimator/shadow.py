@@ -15,14 +15,9 @@ import numpy as np
 from filters.belief import Belief, Evidence
 from filters.linearised.shadow import LINEARISED, ShadowFilter
 from service.estimator.binding import Measurement
-from service.estimator.carrier import Carrier, Pose
+from service.estimator.carrier import Pose
 from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
-
-HEADING_KNOWN = 0.35
-"""Radians: the standard deviation of the heading from which a sine is a straight line to 2 %."""
-
-_HEADING = 2
 
 
 class Shadow:
@@ -47,7 +42,7 @@ class Shadow:
         self._vehicle = vehicle
         self._belief = belief
         self._filter = ShadowFilter(vehicle.motion, vehicle.slow_states)
-        self._carrier = Carrier(vehicle, self._filter)
+        self._carrier = vehicle.carrier(self._filter)
         self._time: int | None = None
         self._running = False
         self.accepted: Counter[str] = Counter()
@@ -95,7 +90,7 @@ class Shadow:
 
     def _begin(self) -> bool:
         moments = self._belief.moments()
-        if moments.variance[_HEADING] > HEADING_KNOWN**2:
+        if not self._vehicle.linearisable(moments):
             return False
         self._filter.initialize(moments)
         self._running = True

@@ -8,9 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from filters.motion.slow import RandomWalk
 from service.config import Configuration
 
 Columns = dict[str, NDArray[np.float32]]
+
+UNKNOWN_DOWN = 2.0
+"""Metres; how far from the origin's height a vehicle may be of whose height nothing was said."""
 
 
 class Anchor(NamedTuple):
@@ -20,14 +24,33 @@ class Anchor(NamedTuple):
     sigma: tuple[float, float, float]
 
 
-def slow_sigmas(configuration: Configuration) -> dict[str, tuple[float, float]]:
-    """Return mean and standard deviation at the start of every slow state, by column name."""
-    sigmas = {"gyro_bias": (0.0, 0.0), "odometry_scale": (1.0, 0.0)}  # marginalised: the motion model knows
+SENSOR_WALK = 1e-4
+"""Per √s; how fast a sensor's scale or bias wanders."""
+
+ZERO = (0.0, 0.0)
+MARGINALISED = {
+    "gyro_bias": ZERO,
+    "odometry_scale": (1.0, 0.0),
+    "velocity_north": ZERO,
+    "velocity_east": ZERO,
+    "velocity_down": ZERO,
+}
+"""Mean and spread of the columns whose own spread at the start the motion model knows."""
+
+
+def sensor_states(configuration: Configuration) -> list[RandomWalk]:
+    """Return the slow states that the sensors ask for, each once."""
+    return [RandomWalk(name, SENSOR_WALK) for name in _sensor_sigmas(configuration)]
+
+
+def _sensor_sigmas(configuration: Configuration) -> dict[str, tuple[float, float]]:
+    """Return mean and standard deviation at the start of every slow state of a sensor, by column name."""
+    sigmas: dict[str, tuple[float, float]] = {}
     for sensor in configuration.sensor:
         if "scale" in sensor.estimate:
-            sigmas[f"{sensor.kind}_scale"] = (1.0, sensor.scale_sigma)
+            sigmas.setdefault(f"{sensor.kind}_scale", (1.0, sensor.scale_sigma))
         if "bias" in sensor.estimate:
-            sigmas[f"{sensor.kind}_bias"] = (0.0, sensor.bias_sigma)
+            sigmas.setdefault(f"{sensor.kind}_bias", (0.0, sensor.bias_sigma))
     return sigmas
 
 
@@ -50,7 +73,10 @@ def draw(
     columns: Columns = {}
     columns["north"], columns["east"] = _places(configuration, count, random, anchor)
     columns["heading"] = _headings(configuration, count, random)
-    for name, (mean, sigma) in slow_sigmas(configuration).items():
+    sigmas = MARGINALISED | _sensor_sigmas(configuration) | {"down": _down(anchor)}
+    for name, (mean, sigma) in sigmas.items():
+        if name not in names:
+            continue
         columns[name] = (mean + sigma * random.standard_normal(count)).astype(np.float32)
     return {name: columns[name] for name in names}
 
@@ -69,7 +95,16 @@ def _places(
     return north.astype(np.float32), east.astype(np.float32)
 
 
+def _down(anchor: Anchor | None) -> tuple[float, float]:
+    """Return mean and standard deviation of a height at the start."""
+    if anchor is None or anchor.position[2] is None:
+        return 0.0, UNKNOWN_DOWN
+    return anchor.position[2], anchor.sigma[2]
+
+
 def _headings(configuration: Configuration, count: int, random: np.random.Generator) -> NDArray[np.float32]:
+    if configuration.vehicle.motion == "constant_velocity":
+        return np.zeros(count, np.float32)  # a point has none
     heading, sigma = configuration.start.heading, configuration.start.sigma_heading
     if heading is None or sigma is None:
         return random.uniform(-math.pi, math.pi, count).astype(np.float32)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,6 +13,7 @@ from rich.console import Console
 from service.decisions import DecisionLogError
 from service.decisions import read as read_decisions
 from service.replay.bars import run_with_bars
+from service.replay.blanking import Blank
 from service.replay.run import Plan, Run
 from service.replay.seeds import summary
 from service.replay.site import setting_of
@@ -34,6 +36,7 @@ def plan_of(
     out: Path | None,
     particles: int,
     console: Console,
+    blanks: tuple[Blank, ...] = (),
 ) -> Plan:
     """Return how to replay ``logs``; what was filled in is told on ``console``.
 
@@ -45,8 +48,10 @@ def plan_of(
     setting = setting_of(logs, config, truth)
     for note in setting.notes:
         console.print(f"[dim]{note}[/dim]", highlight=False)
+    for blank in blanks:
+        console.print(f"[dim]{blank.words}[/dim]", highlight=False)
     known = read_truth(setting.truth) if setting.truth is not None else None
-    return Plan(logs, setting.configuration, particles, known, out)
+    return Plan(logs, setting.configuration, particles, known, out, blanks=blanks)
 
 
 def write_report(path: Path, plan: Plan, runs: list[Run]) -> None:
@@ -84,16 +89,20 @@ def command(
     as_json_object: bool,
     particles: int | None,
     decisions: Path | None = None,
+    blank: Sequence[str] = (),
 ) -> int:
     """Run ``beliefd replay`` and return its exit status: 0 done, 1 a log could not be replayed."""
     console = Console(stderr=as_json_object)
     try:
         if report is not None:
             require_report()
-        plan = plan_of(tuple(logs), config, truth, out, particles or PARTICLES, console)
+        blanks = tuple(Blank.of(text) for text in blank)
+        plan = plan_of(tuple(logs), config, truth, out, particles or PARTICLES, console, blanks)
         if decisions is not None:
             plan = replace(plan, decisions=tuple(read_decisions(decisions)))
         runs = run_with_bars(replace(plan, traced=None if report is None else 0), list(range(seeds)), console)
+        if blank and not any(run.blanked for run in runs):
+            console.print("--blank: there was no such sample in that time", style="yellow", highlight=False)
         if report is not None:
             write_report(report, plan, runs)
     except (LogError, ReportError, DecisionLogError, ValueError, OSError) as error:

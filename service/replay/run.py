@@ -21,6 +21,7 @@ from service.config import Configuration
 from service.decisions import Decided
 from service.estimator import Course, Estimator
 from service.estimator.shadow import Shadow
+from service.replay.blanking import Blank, Blanked
 from service.replay.rows import EstimateFile
 from service.replay.sources import LogError, merged, open_log
 from service.replay.tally import ShadowRun, ShadowTally, Tally
@@ -51,6 +52,8 @@ class Plan:
         The seed whose run is written down tick by tick, for a report.
     decisions : tuple[Decided, ...] or None
         What every tick of a recorded run was allowed; the replay then has its ticks and counts, not ``particles``.
+    blanks : tuple[Blank, ...]
+        Sensors that are taken away for a time.
     """
 
     logs: tuple[Path, ...]
@@ -60,6 +63,7 @@ class Plan:
     out: Path | None = None
     traced: int | None = None
     decisions: tuple[Decided, ...] | None = None
+    blanks: tuple[Blank, ...] = ()
 
 
 @dataclass
@@ -70,6 +74,8 @@ class Run:
     ----------
     shadow : ShadowRun
         What the extended Kalman filter made of the same samples.
+    blanked : int
+        Samples that the plan took away.
     trace : Trace or None
         The run tick by tick, where the plan asked for it.
     """
@@ -88,6 +94,7 @@ class Run:
     links: list[LinkReport]
     shadow: ShadowRun
     last_reason: str = ""
+    blanked: int = 0
     trace: Trace | None = None
 
     def row(self) -> dict[str, object]:
@@ -98,6 +105,7 @@ class Run:
             "particles_mean": round(self.particles_mean, 1),
             "late_samples": self.late_samples,
             "dropped": self.dropped,
+            "blanked": self.blanked,
             "health": self.health,
             "seconds": round(self.seconds, 3),
             "real_time_factor": round(self.real_time_factor, 1),
@@ -166,7 +174,8 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
     shadow = estimator.accompany(Shadow)
     beside = ShadowTally(shadow)
     tracer = estimator.accompany(lambda vehicle, belief: Tracer()) if plan.traced == seed else None
-    samples = merged(readers)
+    seen = Blanked(merged(readers), plan.blanks)
+    samples = iter(seen)
     first = next(samples, None)
     if first is None:
         raise LogError(nothing_in(readers, plan.logs))
@@ -190,6 +199,7 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
     seconds = time.perf_counter() - began
     progress(1.0, tally.ticks / plan.configuration.loop.rate)
     run = _run(seed, plan, estimator, tally, beside, readers, seconds, now)
+    run.blanked = seen.hidden
     run.trace = None if tracer is None else tracer.trace()
     return run
 

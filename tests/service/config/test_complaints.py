@@ -131,7 +131,7 @@ SINGLE = [
         "unicycl",
         "vehicle, motion: needs one of constant_velocity, unicycle, drift, inertial, got",
     ),
-    ("vehicle.motion", "drift", 'vehicle, motion: "drift" is not in this version, which has: unicycle'),
+    ("vehicle.motion", "drift", 'vehicle, motion: "drift" is not in this version, which has: constant_velocity, unicycle'),
     (
         "start.mode",
         "given!",

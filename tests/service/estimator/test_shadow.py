@@ -14,7 +14,8 @@ from filters.sensing import Position, PositionMeasurement
 from service.config import Configuration
 from service.estimator import Estimator
 from service.estimator.binding import Measurement
-from service.estimator.shadow import HEADING_KNOWN, Shadow
+from service.estimator.ground import HEADING_KNOWN
+from service.estimator.shadow import Shadow
 from service.replay.run import ticks_of
 from service.replay.site import setting_of
 from service.replay.sources import merged, open_log

@@ -1,0 +1,185 @@
+"""A ground vehicle: it rolls forward and turns, and its odometer and gyro say how far."""
+
+from __future__ import annotations
+
+import math
+
+from drivers.sample import AnyReading
+from filters.belief import Belief, Displacement, Moments
+from filters.density.gaussian import radius
+from filters.motion.prediction import IntervalNoise, process_covariance, velocity_moments
+from filters.motion.slow import RandomWalk
+from filters.motion.unicycle import GYRO_BIAS, ODOMETRY_SCALE, Unicycle, UnicycleControl
+from filters.particle import ParticleFilter
+from service.config import Configuration
+from service.estimator.carrier import Carrier, Pose
+from service.estimator.controls import Controls, controls_of
+from service.estimator.height import Height, down_of
+from service.estimator.start import Anchor, sensor_states
+from service.estimator.track import SECOND, SPEED_WINDOW
+from service.geodesy import LocalFrame
+
+UNKNOWN_SPEED = 2.0
+"""m/s; how fast a vehicle may move while its odometry is silent (one standard deviation)."""
+
+UNKNOWN_YAW_RATE = 0.5
+"""rad/s; the same for a silent gyro."""
+
+PERSISTENCE = 2.0
+"""Seconds for which such an unknown motion goes on in one direction: it adds up faster than noise."""
+
+CHORDS = 4
+"""Into how many chords the way from the horizon to now is cut."""
+
+HEADING_KNOWN = 0.35
+"""Radians: the standard deviation of the heading from which a sine is a straight line to 2 %."""
+
+_HEADING = 2
+
+
+class GroundVehicle:
+    """Unicycle motion, controls and height; see :class:`service.estimator.vehicle.Vehicle`."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        settings = configuration.motion
+        self.motion = Unicycle(
+            settings.speed_noise,
+            settings.yaw_rate_noise,
+            settings.gyro_bias_walk,
+            settings.odometry_scale_walk,
+            slip_noise=settings.slip_noise,
+            turn_noise=settings.turn_noise,
+            gyro_bias_sigma=settings.gyro_bias_sigma,
+            odometry_scale_sigma=settings.odometry_scale_sigma,
+        )
+        self.controls: Controls = controls_of(settings)
+        self.slow_states: list[RandomWalk] = sensor_states(configuration)
+        self._height = Height()
+
+    def predict(self, belief: ParticleFilter[UnicycleControl], start: int, end: int) -> None:
+        """Move the particles by what the controls say of ``start`` to ``end`` (nanoseconds)."""
+        duration = (end - start) / SECOND
+        belief.predict(self.control(start, end), duration)
+        self._height.wander(duration)
+
+    def control(self, start: int, end: int) -> UnicycleControl:
+        """Return what odometer and gyro say of ``start`` to ``end``, with what is unknown of it as a sigma."""
+        distance, turn = self.controls.distance(start, end), self.controls.turn(start, end)
+        return UnicycleControl(
+            distance.total,
+            turn.total,
+            UNKNOWN_SPEED * math.sqrt(2.0 * PERSISTENCE * max(0.0, distance.unknown)),
+            UNKNOWN_YAW_RATE * math.sqrt(2.0 * PERSISTENCE * max(0.0, turn.unknown)),
+        )
+
+    def displacement(self, start: int, end: int, biases: tuple[float, float]) -> Displacement:
+        """Return the body's rigid motion from ``start`` to ``end``, corrected by (gyro bias, odometry scale)."""
+        bias, scale = biases
+        marks = [start + (end - start) * chord // CHORDS for chord in range(CHORDS + 1)]
+        distances, turns = self.controls.distances(marks), self.controls.turns(marks)
+        drift = bias * (end - start) / SECOND / CHORDS
+        forward = right = turn = 0.0
+        for chord in range(CHORDS):
+            step = turns[chord + 1] - turns[chord] - drift
+            distance = scale * (distances[chord + 1] - distances[chord])
+            forward += distance * math.cos(turn + 0.5 * step)
+            right += distance * math.sin(turn + 0.5 * step)
+            turn += step
+        return Displacement(forward, right, turn)
+
+    def noise(self, start: int, end: int) -> IntervalNoise:
+        """Return the process noise of an interval, as the motion model has it."""
+        return IntervalNoise(*self.motion.noise_variances(self.control(start, end), (end - start) / SECOND))
+
+    def speed_variance(self, time: int) -> float:
+        """Return the variance of the speed that is published for ``time``, (m/s)².
+
+        Where the odometry is silent the vehicle may drive as it likes.
+        """
+        silent = self.controls.distance(time - SPEED_WINDOW // 2, time + SPEED_WINDOW // 2).unknown
+        return self.motion.speed_noise**2 + UNKNOWN_SPEED**2 * min(1.0, silent * SECOND / SPEED_WINDOW)
+
+    def carrier(self, belief: Belief) -> Carrier:
+        """Return what carries ``belief`` to now."""
+        return GroundCarrier(self, belief)
+
+    @staticmethod
+    def linearisable(moments: Moments) -> bool:
+        """Say whether the heading is known well enough to linearise about."""
+        return float(moments.variance[_HEADING]) <= HEADING_KNOWN**2
+
+    @property
+    def missing(self) -> list[str]:
+        """What was never heard of the motion, in the user's words."""
+        sources = zip(("odometry", "yaw rate"), self.controls.sources, strict=True)
+        return [what for what, source in sources if source is None]
+
+    # --- height -------------------------------------------------------------------------------------------------
+
+    def stand_at(self, anchor: Anchor | None) -> None:
+        """Begin the height anew where ``anchor`` has it, if it does."""
+        self._height.begin(anchor)
+
+    @property
+    def height(self) -> tuple[float, float] | None:
+        """Down (m) and its variance (m²), or ``None`` while unknown."""
+        return self._height.moments
+
+    @property
+    def down(self) -> float:
+        """Down, or the origin's own height while unknown."""
+        return self._height.down
+
+    def level(
+        self,
+        belief: ParticleFilter[UnicycleControl],
+        reading: AnyReading,
+        frame: LocalFrame | None,
+        repeats: float,
+    ) -> None:
+        """Correct the height by a position that brings one.
+
+        Its errors are as alike from fix to fix as those of the plane: ``repeats`` fixes share one, and each counts so
+        much less.
+        """
+        measured = down_of(reading, frame)
+        if measured is not None:
+            self._height.correct(measured[0], repeats * measured[1] ** 2)
+
+
+class GroundCarrier:
+    """Carries a planar belief with the controls already received; see :class:`~service.estimator.carrier.Carrier`."""
+
+    def __init__(self, vehicle: GroundVehicle, belief: Belief) -> None:
+        self._vehicle = vehicle
+        self._belief = belief
+        self._biases = (0.0, 1.0)
+        self.displacement: Displacement | None = None
+
+    def at(self, belief_time: int, now: int) -> Pose:
+        """Return the belief carried from ``belief_time`` to ``now`` (nanoseconds)."""
+        vehicle = self._vehicle
+        displacement = vehicle.displacement(belief_time, now, self._biases)
+        moments = self._belief.moments(displacement)
+        index = moments.names.index
+        self._biases = (float(moments.mean[index(GYRO_BIAS)]), float(moments.mean[index(ODOMETRY_SCALE)]))
+        distance = math.hypot(displacement.forward, displacement.right)
+        heading = float(moments.mean[_HEADING])
+        noise = vehicle.noise(belief_time, now)
+        covariance = moments.pose_covariance + process_covariance(
+            distance, heading - 0.5 * displacement.turn, noise
+        )
+        self.displacement = displacement
+        heading_variance = float(covariance[_HEADING, _HEADING])
+        speed = vehicle.controls.speed(now) * self._biases[1]
+        velocity = velocity_moments(speed, vehicle.speed_variance(now), heading, heading_variance)
+        height = vehicle.height
+        return Pose(
+            moments,
+            covariance,
+            (heading, heading_variance),
+            None if height is None else (*height, 0.0, 0.0),
+            (velocity.north, velocity.east, None),
+            (velocity.nn, velocity.ne, None, velocity.ee, None, None),
+            radius(covariance[:2, :2], 0.95),
+        )

@@ -1,0 +1,93 @@
+"""Taking a sensor away for a time, to see how the belief fares without it: ``position:20-50``.
+
+What is blanked never reaches the estimator. Seconds count from the first sample of the replay, on the receive clock.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple, get_args
+
+from drivers.sample import Sample
+from service.config.belief import SensorKind
+from service.estimator.binding import takes
+
+SECOND = 1_000_000_000
+_FORM = re.compile(r"(?P<what>[^\s:]+):(?P<first>\d+(?:\.\d*)?)-(?P<last>\d+(?:\.\d*)?)?")
+
+
+class Blank(NamedTuple):
+    """One sensor taken away for a time.
+
+    Attributes
+    ----------
+    what : str
+        A kind of sensor (``position``), or the name that the wire has for who says it (``GPS_RAW_INT``).
+    first, last : float
+        From and to when, seconds since the beginning of the replay.
+    """
+
+    what: str
+    first: float
+    last: float
+
+    @classmethod
+    def of(cls, text: str) -> Blank:
+        """Read ``WHAT:FROM-TO``, or ``WHAT:FROM-`` to the end.
+
+        Raises
+        ------
+        ValueError
+            It does not say that; the text says what would be right.
+        """
+        found = _FORM.fullmatch(text.strip())
+        if found is None:
+            raise ValueError(
+                f"--blank: needs WHAT:FROM-TO in seconds, such as position:20-50 or GPS_RAW_INT:20-50, got {text}"
+            )
+        first, last = float(found["first"]), float(found["last"] or math.inf)
+        if not first < last:
+            raise ValueError(f"--blank: needs a time after {first:g} s for its end, got {text}")
+        return cls(found["what"], first, last)
+
+    @property
+    def words(self) -> str:
+        """What it does, in the user's words."""
+        until = "the end" if self.last == math.inf else f"{self.last:g} s"
+        return f"blanked: {self.what} from {self.first:g} s to {until}"
+
+    def hides(self, sample: Sample, seconds: float) -> bool:
+        """Whether ``sample``, received so long after the beginning, is taken away."""
+        if not self.first <= seconds < self.last:
+            return False
+        if self.what in get_args(SensorKind):
+            return isinstance(sample.reading, takes(self.what))
+        return sample.source == self.what
+
+
+class Blanked:
+    """A stream of samples without those that are hidden.
+
+    Attributes
+    ----------
+    hidden : int
+        How many were taken away so far.
+    """
+
+    def __init__(self, samples: Iterable[Sample], blanks: Sequence[Blank]) -> None:
+        self.hidden = 0
+        self._samples = samples
+        self._blanks = blanks
+
+    def __iter__(self) -> Iterator[Sample]:
+        """Yield the samples that no blank hides, in their order."""
+        begin: int | None = None
+        for sample in self._samples:
+            begin = sample.received if begin is None else begin
+            seconds = (sample.received - begin) / SECOND
+            if any(blank.hides(sample, seconds) for blank in self._blanks):
+                self.hidden += 1
+            else:
+                yield sample
