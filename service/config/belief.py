@@ -168,11 +168,19 @@ class Sensor(Section):
     outliers: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=1)] = 0.05
     """Share of readings that mean nothing."""
     estimate: tuple[SlowState, ...] = ()
-    """Slow states to estimate with the pose, of ranges: scale, bias, delay."""
+    """Slow states to estimate with the pose: of ranges scale and bias, of positions and velocities delay.
+
+    A receiver's positions and velocities share one delay; it shows only where odometry tells how the vehicle moves."""
     delay_ms: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=10_000)] = 0.0
     """Known latency before the stamp, ms (ArduPilot SITL GPS: 90)."""
     scale_sigma: NotNegative = 0.05
     """What an estimated scale may be off by at the start (one standard deviation)."""
+    delay_sigma: NotNegative = 0.1
+    """What an estimated delay may be off by at the start, beyond delay_ms, seconds (one standard deviation)."""
+    correlation_s: NotNegative | None = None
+    """Seconds over which its errors stay alike: readings closer together count as one.
+
+    Default: 1 for position, velocity and heading, 0 (every reading counts for itself) for all others."""
     bias_sigma: NotNegative = 0.2
     """What an estimated bias may be at the start, in the reading's unit (one standard deviation)."""
     declination_deg: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-180, le=180)] = 0.0

@@ -24,8 +24,14 @@ class Anchor(NamedTuple):
     sigma: tuple[float, float, float]
 
 
+DELAY = "gnss_delay"
+"""The slow state of a receiver's delay: one for its positions and its velocities, which come of the same fix."""
+
 SENSOR_WALK = 1e-4
 """Per √s; how fast a sensor's scale or bias wanders."""
+
+DELAY_WALK = 1e-3
+"""s per √s; a receiver that is busy answers later."""
 
 ZERO = (0.0, 0.0)
 MARGINALISED = {
@@ -40,7 +46,9 @@ MARGINALISED = {
 
 def sensor_states(configuration: Configuration) -> list[RandomWalk]:
     """Return the slow states that the sensors ask for, each once."""
-    return [RandomWalk(name, SENSOR_WALK) for name in _sensor_sigmas(configuration)]
+    return [
+        RandomWalk(name, DELAY_WALK if name == DELAY else SENSOR_WALK) for name in _sensor_sigmas(configuration)
+    ]
 
 
 def _sensor_sigmas(configuration: Configuration) -> dict[str, tuple[float, float]]:
@@ -51,6 +59,8 @@ def _sensor_sigmas(configuration: Configuration) -> dict[str, tuple[float, float
             sigmas.setdefault(f"{sensor.kind}_scale", (1.0, sensor.scale_sigma))
         if "bias" in sensor.estimate:
             sigmas.setdefault(f"{sensor.kind}_bias", (0.0, sensor.bias_sigma))
+        if "delay" in sensor.estimate:
+            sigmas.setdefault(DELAY, (0.0, sensor.delay_sigma))
     return sigmas
 
 
