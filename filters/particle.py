@@ -14,12 +14,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from filters import strata
 from filters.belief import STILL, Displacement, Evidence, Joint, Moments
 from filters.crew import ALIGNMENT, Blocks, Crew
 from filters.kernels import random, resampling, weights
-from filters.kernels.compile import Float32Array
+from filters.kernels.compile import Float32Array, Int32Array
 from filters.kernels.covariance import covariance
 from filters.kernels.regularization import shrink
 from filters.motion.model import Motion
@@ -370,15 +371,65 @@ class ParticleFilter(Generic[Control]):
         else:
             scheme(source, target, uniform, ancestors)
         self._draws += 1
-        self._recount(target)
+        self._lay_out(ancestors)
+        self._level()
+
+    def resample_by_label(self, labels: Int32Array, quotas: NDArray[np.int64]) -> None:
+        """Draw a given number of particles from those of each label, and lay the labels out with them.
+
+        Stratified sampling with any allocation (section 4.3.4): within a label Table 4.4, and a particle then has its
+        label's weight over its quota. So however few or many a label is given, its share of the belief stays exactly
+        what it was; one with a quota of zero is gone.
+
+        Parameters
+        ----------
+        labels : (capacity,) int32
+            Of each particle, below the number of quotas; changed in place.
+        quotas : (number of labels,) int64
+            How many there will be of each.
+
+        Raises
+        ------
+        ValueError
+            Labels that are too few; quotas that are negative, sum to less than 1 or more than the capacity, or are not
+            zero where a label has no weight. The set is as it was then.
+        """
+        self._settle()
+        target = int(quotas.sum())
+        if labels.shape != (self.capacity,) or not 1 <= target <= self.capacity:
+            raise ValueError(
+                f"resample: {self.capacity} labels and quotas that sum to 1 to {self.capacity} are needed, got "
+                f"{labels.shape} and a sum of {target}"
+            )
+        uniform = random.uniform(self._seed, _RESAMPLING_STREAM, self._draws + 1)
+        ancestors = self._ancestors[:target]
+        before = labels[: self.count].copy()
+        worth = strata.draw(self._weights[: self.count], before, quotas, uniform, ancestors)
+        self._draws += 1
+        self._lay_out(ancestors)
+        self._lay_out_labels(before, labels, ancestors)
+        self._level()
+        log_weights = self._particles.log_weights
+        log_weights[:target] = worth[labels[:target]]
+        self._log_sum = weights.log_sum.direct(log_weights, self._sampled, self._stride, self._sample)
+        self.normalize()
+
+    def _lay_out(self, ancestors: Int32Array) -> None:
+        """Put the copies in the place of the particles."""
+        self._recount(ancestors.size)
         columns, spare, blocks = self._particles.columns, self._spare, self._blocks
 
         def act(part: int, first: int, last: int) -> None:
             resampling.deal(columns, spare, ancestors, blocks.bounds, first, last)
 
-        blocks.split(-(-target // resampling.RUN), ALIGNMENT, act)
+        blocks.split(-(-ancestors.size // resampling.RUN), ALIGNMENT, act)
         self._particles.columns, self._spare = spare, columns
-        self._level()
+
+    def _lay_out_labels(self, before: Int32Array, labels: Int32Array, ancestors: Int32Array) -> None:
+        """Do the same with a whole number for each; copying looks at no bit, so they may pass for float32."""
+        source, target = before.view(np.float32)[None], labels.view(np.float32)[None]
+        runs = -(-ancestors.size // resampling.RUN)
+        resampling.deal(source, target, ancestors, self._blocks.bounds, 0, runs)
 
     def inject(
         self, columns: Mapping[str, ArrayLike], count: int | None = None, scheme: Resampler = systematic

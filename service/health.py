@@ -48,6 +48,8 @@ class Facts:
         Particles that the budget allows, and the fewest that make a filter.
     delay : int
         Nanoseconds by which the belief lies behind ``now``: how old even the newest measurement is.
+    searching : str
+        What is done to find a place for a belief that has none, in the user's words; empty when it has one.
     """
 
     now: int
@@ -57,6 +59,7 @@ class Facts:
     afforded: int
     minimum: int
     delay: int = 0
+    searching: str = ""
 
 
 @dataclass(slots=True)
@@ -107,6 +110,8 @@ class HealthMonitor:
                 HealthState.STARVED,
                 f"the budget affords {facts.afforded} particles, fewer than particles_min = {facts.minimum}",
             )
+        if facts.searching:
+            return HealthState.CONVERGING, facts.searching
         silent = self._silence(facts)
         if silent is not None:
             return HealthState.DEAD_RECKONING, silent

@@ -34,7 +34,7 @@ BEAT_RATE = 10.0
 CLOUD_RATE = 5.0
 
 _OTHER = "other"
-_FIXED_STAGES = ("ingest", "publishing", _OTHER)
+_FIXED_STAGES = ("ingest", "search", "publishing", _OTHER)
 
 
 class Estimator(Protocol):

@@ -8,16 +8,21 @@ machine, from which the governor starts. Nothing else of it is kept, and nothing
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
 from statistics import median
 
 import msgspec
 
+from drivers.maps import landmarks
 from drivers.sample import (
     AnyReading,
+    Bearing,
     Heading,
     LocalPosition,
     Odometer,
     Range,
+    RangeBearing,
     Rotation,
     Sample,
     SampleBatch,
@@ -39,6 +44,7 @@ _TICKS = 50
 _WARM = 20
 _PERIOD_NS = 20_000_000
 _SPEED = 1.0
+_FEW = 4
 _LEAST = 1e-11
 """Seconds per particle below which no slope is believed: the fastest kernel needs more for one load."""
 
@@ -108,6 +114,16 @@ def _readings(sensor: Sensor, configuration: Configuration, north: float) -> lis
         return [LocalPosition(north, 0.0, 0.0)]
     if sensor.kind == "velocity":
         return [Velocity(_SPEED, 0.0, 0.0)]
+    if sensor.kind == "bearing":
+        return [Bearing(0.0, landmark) for landmark in _landmarks(configuration.map.landmarks)]
+    if sensor.kind == "range_bearing":
+        return [RangeBearing(10.0, 0.0, landmark) for landmark in _landmarks(configuration.map.landmarks)]
     if sensor.kind == "heading":
         return [Heading(0.0)]
     return []
+
+
+@cache
+def _landmarks(path: str) -> list[int]:
+    """Return the numbers of a few landmarks of a map."""
+    return list(landmarks.read(Path(path)))[:_FEW] if path else []

@@ -75,7 +75,9 @@ def _sensor(facts: SensorFacts) -> str:
     values: dict[str, Value] = {"kind": facts.kind, "link": facts.link}
     if facts.source:
         values["source"] = facts.source
-    values |= {"sigma": facts.sigma, "outliers": facts.outliers}
+    if facts.sigma is not None:
+        values["sigma"] = facts.sigma
+    values["outliers"] = facts.outliers
     if facts.delay_ms:
         values["delay_ms"] = facts.delay_ms
     if facts.declination_deg:

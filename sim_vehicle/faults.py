@@ -1,4 +1,4 @@
-"""What goes wrong, and when: windows of time in which a link or a sensor drops, corrupts, repeats or delays.
+"""What goes wrong, and when: windows of time in which a link drops, corrupts, repeats, reorders or delays.
 
 A fault is data; :class:`Faults` applies those of one target, with random numbers of its own, so that the
 noise of everything else stays as it was. What it did is counted.
@@ -34,6 +34,7 @@ class Kind(StrEnum):
     CORRUPT = "corrupt"
     REPEAT = "repeat"
     DELAY = "delay"
+    REORDER = "reorder"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,8 @@ class Fault:
     share : float
         Of the frames or readings in the window.
     delay : float
-        Seconds, for :attr:`Kind.DELAY`.
+        Seconds, for :attr:`Kind.DELAY`; the longest time that a frame lags behind others, for
+        :attr:`Kind.REORDER` (links only).
     """
 
     target: str
@@ -94,6 +96,10 @@ class Faults:
         ]
         self.counts.update(fault.kind for fault in struck)
         return struck
+
+    def lag(self, fault: Fault) -> float:
+        """Draw by how many seconds a reordered frame comes later than it would have."""
+        return fault.delay * float(self._chance.random())
 
     def corrupted(self, data: bytes) -> bytes:
         """Return the bytes with one to three of them changed."""

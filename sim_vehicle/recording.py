@@ -2,8 +2,8 @@
 
 ``STEM.tlog``: for each MAVLink frame eight bytes of big-endian Unix microseconds of its arrival, then the
 frame. ``STEM.candump.log``: one line per CAN frame, as ``candump -L`` writes them. ``STEM_truth.csv``: the
-pose 50 times a second on the same clock. ``STEM.toml``: the configuration. The same seed gives the same
-bytes.
+pose 50 times a second on the same clock. ``STEM.toml``: the configuration. ``STEM_events.csv``, where the
+scenario has any: when what befalls the drive. The same seed gives the same bytes.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from sim_vehicle.world import Truth
 
 TRUTH_RATE = 50
 TRUTH_HEADER = "time_s,north_m,east_m,down_m,heading_rad\n"
+EVENTS_HEADER = "time_s,event\n"
 _CAN_INTERFACE = "can0"
 
 
@@ -41,6 +42,11 @@ def truth_row(truth: Truth, unix: float) -> str:
     """Return one line of the truth: Unix seconds, metres, heading in (-pi, pi]."""
     position = f"{truth.north:.6f},{truth.east:.6f},{truth.down:.6f}"
     return f"{unix + truth.time:.6f},{position},{truth.wrapped_heading:.8f}\n"
+
+
+def event_rows(scenario: Scenario, unix: float) -> str:
+    """Return the table of what befalls the drive: Unix seconds and a word each."""
+    return EVENTS_HEADER + "".join(f"{unix + event.time:.6f},{event.name}\n" for event in scenario.events)
 
 
 def candump_line(unix_us: int, frame: CanFrame) -> str:
@@ -72,6 +78,9 @@ def write(scenario: Scenario, seed: int, seconds: float, stem: Path) -> Recorded
     stem.parent.mkdir(parents=True, exist_ok=True)
     listening = Listening(can=("socketcan", "vcan0") if scenario.bus else None)
     settings.write_text(configuration.text(scenario, listening))
+    if scenario.events:
+        paths.append(stem.with_name(stem.name + "_events.csv"))
+        paths[-1].write_text(event_rows(scenario, float(LOG_EPOCH)))
     with telemetry.open("wb") as tlog, truth.open("w", newline="") as rows:
         if scenario.bus is None:
             counts = _drive(vehicle, seconds, tlog, rows, None)

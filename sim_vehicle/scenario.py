@@ -34,16 +34,27 @@ class StartBelief:
 
 @dataclass(frozen=True, slots=True)
 class SensorFacts:
-    """One ``[[sensor]]`` of the configuration that goes with the drive; the names are the configuration's."""
+    """One ``[[sensor]]`` of the configuration that goes with the drive; the names are the configuration's.
+
+    Without a ``sigma`` the daemon goes by what the readings claim.
+    """
 
     kind: str
     link: str
-    sigma: float
+    sigma: float | None
     outliers: float = 0.0
     delay_ms: float = 0.0
     declination_deg: float = 0.0
     source: str = ""
     estimate: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that a scorer wants to know the time of: seconds since the drive began, and a word."""
+
+    time: float
+    name: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +75,8 @@ class Scenario:
         What is on the CAN bus.
     facts : tuple[SensorFacts, ...]
         True-to-life sigmas for the configuration.
+    events : tuple[Event, ...]
+        What befalls the drive, in order of time: when a fault begins, when a sensor is honest again.
     """
 
     name: str
@@ -87,3 +100,4 @@ class Scenario:
     facts: tuple[SensorFacts, ...] = ()
     motion: dict[str, float] = field(default_factory=dict[str, float])
     faults: tuple[Fault, ...] = ()
+    events: tuple[Event, ...] = ()

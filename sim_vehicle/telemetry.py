@@ -180,7 +180,7 @@ def gps_raw_int(known: Knowledge) -> Message:
         round(1e3 * altitude),
         min(0xFFFF, round(100.0 * gnss.dilution)),
         min(0xFFFF, round(160.0 * gnss.dilution)),
-        round(100.0 * speed),
+        min(0xFFFE, round(100.0 * speed)),
         round(100.0 * course) % 36_000,
         gnss.satellites,
         round(1e3 * altitude),

@@ -7,6 +7,7 @@ same.
 
 from __future__ import annotations
 
+import bisect
 import heapq
 import importlib
 import itertools
@@ -35,6 +36,10 @@ class Sensor(Protocol):
     def measure(self, truth: Truth) -> Any:
         """Return a reading of the truth, or ``None``."""
         ...
+
+
+def _arrival_time(arrival: Arrival[Any]) -> float:
+    return arrival.time
 
 
 Take = Callable[[Any, float], None]
@@ -207,12 +212,13 @@ class Vehicle:
         self._every(1.0, bus.status)
 
     def _send_mavlink(self, time: float, frame: bytes) -> None:
-        self._on_the_way.mavlink.extend(self.mavlink.carry(time, frame))
+        for arrival in self.mavlink.carry(time, frame):
+            bisect.insort(self._on_the_way.mavlink, arrival, key=_arrival_time)
 
     def _send_can(self, time: float, frame: CanFrame) -> None:
         for arrival in self.can.carry(time, frame.data):
             spoilt = CanFrame(frame.identifier, arrival.frame, frame.extended)
-            self._on_the_way.can.append(Arrival(arrival.time, spoilt))
+            bisect.insort(self._on_the_way.can, Arrival(arrival.time, spoilt), key=_arrival_time)
 
     def _arrived(self, until: float) -> Frames:
         way = self._on_the_way

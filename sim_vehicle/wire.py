@@ -7,7 +7,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from sim_vehicle.faults import Faults, Kind
+from sim_vehicle.faults import Fault, Faults, Kind
 
 FrameT = TypeVar("FrameT")
 
@@ -42,7 +42,7 @@ class Arrival(NamedTuple, Generic[FrameT]):
 
 
 class Wire:
-    """One link's delay and losses; frames leave in the order in which they were handed in.
+    """One link's delay and losses; frames arrive in the order in which they were handed in, unless reordered.
 
     Parameters
     ----------
@@ -76,8 +76,11 @@ class Wire:
             delay += struck[Kind.DELAY].delay
         if Kind.CORRUPT in struck:
             frame = self.faults.corrupted(frame)
-        self._last = max(time + delay, self._last + settings.spacing)
-        arrivals = [Arrival(self._last, frame)]
-        if Kind.REPEAT in struck:
-            arrivals.append(Arrival(self._last, frame))
-        return arrivals
+        return [Arrival(self._arrival(time + delay, struck), frame)] * (2 if Kind.REPEAT in struck else 1)
+
+    def _arrival(self, earliest: float, struck: dict[Kind, Fault]) -> float:
+        if Kind.REORDER in struck:
+            # Whoever lags lets the others pass: it holds up nobody.
+            return earliest + self.faults.lag(struck[Kind.REORDER])
+        self._last = max(earliest, self._last + self._settings.spacing)
+        return self._last

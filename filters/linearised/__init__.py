@@ -4,23 +4,24 @@ Each is made of the particle filter's own model and takes the same controls and 
 run on the same samples with the same parameters. What they leave out is the outlier part: a Gaussian has a gate.
 """
 
-from filters.linearised.bearing import BearingMeasurement, LinearisedBearing
+from filters.linearised.bearing import LinearisedBearing
 from filters.linearised.constant_velocity import LinearisedConstantVelocity
 from filters.linearised.down import LinearisedDown
 from filters.linearised.heading import LinearisedHeading
 from filters.linearised.position import LinearisedPosition
 from filters.linearised.range import LinearisedRange
+from filters.linearised.range_bearing import LinearisedRangeBearing
 from filters.linearised.unicycle import LinearisedUnicycle
 from filters.linearised.velocity import LinearisedVelocity
 
 __all__ = [
-    "BearingMeasurement",
     "LinearisedBearing",
     "LinearisedConstantVelocity",
     "LinearisedDown",
     "LinearisedHeading",
     "LinearisedPosition",
     "LinearisedRange",
+    "LinearisedRangeBearing",
     "LinearisedUnicycle",
     "LinearisedVelocity",
 ]

@@ -17,26 +17,30 @@ import numpy as np
 from filters.belief import STILL, Displacement, Evidence, Joint, Moments
 from filters.extended_kalman import ExtendedKalmanFilter, LinearisedMotion, LinearisedSensor
 from filters.kalman import Matrix, symmetric
+from filters.linearised.bearing import LinearisedBearing
 from filters.linearised.constant_velocity import LinearisedConstantVelocity
 from filters.linearised.down import LinearisedDown
 from filters.linearised.heading import LinearisedHeading
 from filters.linearised.position import LinearisedPosition
 from filters.linearised.range import LinearisedRange
+from filters.linearised.range_bearing import LinearisedRangeBearing
 from filters.linearised.unicycle import LinearisedUnicycle
 from filters.linearised.velocity import LinearisedVelocity
 from filters.motion.constant_velocity import ConstantVelocity
 from filters.motion.model import Motion
 from filters.motion.slow import RandomWalk
 from filters.motion.unicycle import Unicycle
-from filters.sensing import Heading, Position, Range, Sensor, Velocity
+from filters.sensing import Bearing, Heading, Position, Range, RangeBearing, Sensor, Velocity
 from filters.sensing.down import Down
 
 LINEARISED: Mapping[type, Callable[[Any], LinearisedSensor[Any]]] = MappingProxyType(
     {
+        Bearing: LinearisedBearing,
         Down: LinearisedDown,
         Heading: LinearisedHeading,
         Position: LinearisedPosition,
         Range: LinearisedRange,
+        RangeBearing: LinearisedRangeBearing,
         Velocity: LinearisedVelocity,
     }
 )

@@ -36,6 +36,7 @@ SensorKind = Literal[
     "speed",
 ]
 SlowState = Literal["scale", "bias", "delay"]
+Association = Literal["known", "unknown"]
 
 
 class Vehicle(Section):
@@ -144,6 +145,10 @@ class Motion(Section):
     """Source of the speed: a message name as the wire has it (WHEEL_DISTANCE, esc.Status, …) or auto."""
     yaw_rate_from: Annotated[str, Field(min_length=1)] = "auto"
     """Source of the yaw rate: a message name (RAW_IMU, HIGHRES_IMU, ahrs.RawIMU, …), wheels, or auto."""
+    yaw_rate_delay_ms: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=500)] = 0.0
+    """By how much a yaw rate of a gyro is older than its stamp, ms: what it is filtered with delays it.
+
+    ArduPilot filters the gyros of rovers and boats at 4 Hz (INS_GYRO_FILTER), which takes 56 ms."""
     wheel_track: Positive | None = None
     """Distance between the left and the right wheels, metres: yaw rate from two wheels that differ."""
     wheel_radius: Positive | None = None
@@ -185,6 +190,10 @@ class Sensor(Section):
     """What an estimated bias may be at the start, in the reading's unit (one standard deviation)."""
     declination_deg: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-180, le=180)] = 0.0
     """For a magnetic heading: degrees that magnetic north lies east of true north."""
+    sigma_bearing: Positive | None = None
+    """For range_bearing: standard deviation of the bearing, rad; sigma is that of the distance."""
+    association: Association = "known"
+    """Of landmarks: known, by the number that the reading says; unknown: any of the map, whatever it says."""
     beacons: tuple[Annotated[Whole, Field(ge=0, le=65535)], ...] | None = None
     """Only ranges to these beacons; without it: to every [[beacon]]."""
 
@@ -223,7 +232,7 @@ class Map(Section):
     occupancy: str = ""
     """Occupancy grid: ROS map .yaml with its .pgm or .png."""
     landmarks: str = ""
-    """CSV of landmarks: id,north,east."""
+    """Landmarks: CSV with a first line id,north,east, in metres."""
 
 
 class Honesty(Section):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from service.config.complaints import did_you_mean
+from service.config.landmarks import wrong_landmarks
 from service.config.places import place_in_words
 from service.config.section import shown
 from service.config.signals import wrong_signals
@@ -21,15 +22,15 @@ Table = Mapping[str, Any]
 NOT_BUILT: dict[tuple[str, str], tuple[frozenset[object], str]] = {
     ("vehicle", "motion"): (frozenset({"drift", "inertial"}), "constant_velocity, unicycle"),
     ("sensor", "kind"): (
-        frozenset({"bearing", "range_bearing", "altitude", "terrain", "scan", "speed"}),
-        "position, velocity, range, heading",
+        frozenset({"altitude", "terrain", "scan", "speed"}),
+        "position, velocity, range, bearing, range_bearing, heading",
     ),
     ("link", "send"): (frozenset({"odometry", "gps_input", "global_position_sensor"}), "none"),
 }
-NOT_READ = (("map", "terrain"), ("map", "occupancy"), ("map", "landmarks"), ("publish", "ros2_domain"))
+NOT_READ = (("map", "terrain"), ("map", "occupancy"), ("publish", "ros2_domain"))
 _NOTHING: tuple[object, ...] = ("", -1)
 
-FILES = (("link", "signing_key_file"), ("link", "dbc"), ("publish", "zenoh"))
+FILES = (("link", "signing_key_file"), ("link", "dbc"), ("publish", "zenoh"), ("map", "landmarks"))
 """Keys that name files; relative ones are relative to the configuration's folder."""
 
 
@@ -191,5 +192,6 @@ def across_sections(raw: Table) -> list[str]:
         *_slow_states_of_others(raw),
         *_slow_states_only_once(raw),
         *_absent_files(raw),
+        *wrong_landmarks(raw),
         *wrong_signals(entries(raw, "link"), raw),
     ]

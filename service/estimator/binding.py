@@ -12,7 +12,15 @@ import math
 
 from drivers.sample import Inertial, Sample
 from service.config import Sensor
-from service.estimator.measuring import KINDS, Measurement, Place, Refusal, Surroundings, position_of
+from service.estimator.measuring import (
+    KINDS,
+    Measurement,
+    Place,
+    Refusal,
+    Surroundings,
+    position_of,
+    surroundings_of,
+)
 
 SECOND = 1_000_000_000
 MAGNETIC_INTERVAL = SECOND // 5
@@ -24,7 +32,16 @@ SHORTEST_INTERVAL = 1e-3
 TIMING = 0.02
 """Seconds by which a stamp may be off after its clock was mapped: at speed v, v times this many metres."""
 
-__all__ = ["BoundSensor", "Measurement", "Place", "Refusal", "Surroundings", "position_of", "takes"]
+__all__ = [
+    "BoundSensor",
+    "Measurement",
+    "Place",
+    "Refusal",
+    "Surroundings",
+    "position_of",
+    "surroundings_of",
+    "takes",
+]
 
 
 def takes(kind: str) -> tuple[type, ...]:
@@ -40,7 +57,7 @@ class BoundSensor:
     settings : Sensor
         Kind, link, sigma, outliers, slow states.
     surroundings : Surroundings
-        The beacons of the configuration, by id.
+        The beacons and landmarks of the configuration, by id.
     """
 
     def __init__(self, settings: Sensor, surroundings: Surroundings) -> None:

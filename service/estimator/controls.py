@@ -300,5 +300,10 @@ def controls_of(settings: MotionSettings) -> Controls:
     if settings.throttle_channel is not None:
         throttle = Throttle(settings.throttle_channel, settings.throttle_speed)
     return Controls(
-        settings.wheel_radius, settings.wheel_track, settings.speed_from, settings.yaw_rate_from, throttle
+        settings.wheel_radius,
+        settings.wheel_track,
+        settings.speed_from,
+        settings.yaw_rate_from,
+        throttle,
+        round(settings.yaw_rate_delay_ms * 1e6),
     )

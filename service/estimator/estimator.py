@@ -27,10 +27,12 @@ from service.estimator.fusion import Fusion
 from service.estimator.intake import Intake, Passed
 from service.estimator.output import Output
 from service.estimator.population import Population
+from service.estimator.search import Search
 from service.estimator.start import Anchor, draw
 from service.estimator.starting import Starter
 from service.estimator.stopwatch import Silent, Stopwatch
 from service.estimator.track import SECOND
+from service.estimator.trust import trust_of
 from service.estimator.vehicle import Vehicle, vehicle_of
 from service.health import Facts, HealthMonitor
 
@@ -81,6 +83,13 @@ class Estimator:
         self._fusion = Fusion(
             self._vehicle, self._filter, self._population, self._intake, self.health, self._stopwatch
         )
+        self._search = Search(configuration, self._vehicle, self._filter.names, seed)
+        self._fusion.search = self._search
+        self._fusion.companions.append(self._search)
+        self._trust = trust_of(configuration, self._vehicle, self._filter, seed)
+        if self._trust is not None:
+            self._fusion.trust = self._trust
+            self._fusion.companions.append(self._trust)
         self._output = Output(self._vehicle, self._filter)
         self._sequence = 0
         self._freely = Course()
@@ -147,11 +156,26 @@ class Estimator:
 
     def _move(self, now: int, horizon: int, passed: Passed, afforded: int, course: Course) -> None:
         """Bring the belief to the horizon with all that was measured up to there."""
+        taken_back = self._fusion.taken_back
         self._fusion.fuse(passed, afforded, course)
         self._fusion.keep_up(horizon)
+        self.reset_counter += self._fusion.taken_back - taken_back
+        self._find(afforded)
         self._population.fit(afforded)
         if course.level is not Level.PREDICTION_ONLY:
             self._population.reckon(now)
+
+    def _find(self, afforded: int) -> None:
+        """Let the search for the place go on, and begin anew where it has found one."""
+        assert self._fusion.time is not None
+        blind = self._search.blind
+        self._search.work(self._fusion.time)
+        found = self._search.found(self._fusion.time, self._population.clamp(START_COUNT, afforded))
+        if found is not None:
+            self._filter.initialize(found)
+            self._fusion.begin(self._fusion.time)
+            self.reset_counter += not blind
+        self._stopwatch.lap("search")
 
     # --- estimates out ------------------------------------------------------------------------------------------
 
@@ -166,7 +190,10 @@ class Estimator:
             afforded,
             self.configuration.budget.particles_min,
             now - self._intake.horizon,
+            self._search.status,
         )
+        if pose is not None:
+            self._search.published(pose.moments)
         state = self.health.judge(facts)
         return self._output.estimate(
             pose,
@@ -200,7 +227,7 @@ class Estimator:
 
     def sensors(self, now: int) -> list[SensorStatus]:
         """Return every sensor's status, heard or not; rates are over the time since the last call."""
-        return self._intake.statuses(now)
+        return self._intake.statuses(now, None if self._trust is None else self._trust.log_odds)
 
     def cloud(self, count: int) -> NDArray[np.float32]:
         """Return a fair sub-sample of the particles at the last tick: north, east, heading, weight; (count, 4)."""

@@ -15,9 +15,11 @@ from service.estimator.course import Course, Level
 from service.estimator.intake import Intake, Passed, Waiting
 from service.estimator.population import Population
 from service.estimator.records import SensorRecord
+from service.estimator.search import Search
 from service.estimator.stopwatch import Stopwatch
 from service.estimator.thinning import spaced
 from service.estimator.track import SECOND
+from service.estimator.trust import Trust
 from service.estimator.vehicle import Vehicle
 from service.health import HealthMonitor
 
@@ -58,6 +60,12 @@ class Fusion:
         The belief's time, nanoseconds; ``None`` before it began.
     companions : list[Companion]
         Who is told of every step.
+    search : Search or None
+        Takes the measurements instead of the belief while that has no place.
+    trust : Trust or None
+        Asked before each measurement whether its sensor is believed; a companion, too.
+    taken_back : int
+        How often the belief began anew because a sensor had led it away.
     """
 
     def __init__(
@@ -71,6 +79,9 @@ class Fusion:
     ) -> None:
         self.time: int | None = None
         self.companions: list[Companion] = []
+        self.search: Search | None = None
+        self.trust: Trust | None = None
+        self.taken_back = 0
         self._vehicle = vehicle
         self._belief = belief
         self._population = population
@@ -143,11 +154,33 @@ class Fusion:
         if isinstance(measured, Refusal):
             record.refused[measured.reason] += 1
             return
+        if not self._believed(time, waiting, measured):
+            record.refused["distrusted"] += 1
+            return
         self._vehicle.level(self._belief, waiting.sample.reading, self._intake.frame, measured.repeats)
         self._take_evidence(time, measured, record)
         self._stopwatch.lap("sensing")
 
+    def _believed(self, time: int, waiting: Waiting, measured: Measurement) -> bool:
+        """Ask whether the sensor is trusted; what one that was just found out did to the belief is taken back."""
+        if self.trust is None or (self.search is not None and self.search.blind):
+            return True
+        believed = self.trust.admits(time, waiting.sample, measured)
+        particles = self.trust.take_back()
+        if particles is not None:
+            self._belief.inject(particles)
+            self.taken_back += 1
+            for companion in self.companions:
+                if companion is not self.trust:
+                    companion.started(time)
+        return believed
+
     def _take_evidence(self, time: int, measured: Measurement, record: SensorRecord) -> None:
+        if self.search is not None and self.search.blind:
+            self.search.heard(time, measured)
+            record.accepted += 1
+            record.last = time
+            return
         evidence = self._belief.weigh(measured.model, measured.value)
         if not evidence.accepted:
             record.refused["invalid"] += 1

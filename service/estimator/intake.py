@@ -13,7 +13,7 @@ from drivers.plausibility import implausible
 from drivers.sample import Origin, Sample
 from service.config import Configuration
 from service.estimate import SensorStatus
-from service.estimator.binding import BoundSensor, Surroundings
+from service.estimator.binding import BoundSensor, surroundings_of
 from service.estimator.controls import Controls
 from service.estimator.records import SensorRecords
 from service.geodesy import Geodetic, LocalFrame
@@ -52,7 +52,7 @@ class Intake:
     """
 
     def __init__(self, configuration: Configuration, controls: Controls) -> None:
-        surroundings = Surroundings({beacon.id: beacon for beacon in configuration.beacon})
+        surroundings = surroundings_of(configuration)
         self.records = SensorRecords()
         self.dropped: Counter[str] = Counter()
         self.frame = _configured_frame(configuration)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from sim_vehicle.scenario import Scenario
-from sim_vehicle.scenarios import beacons, demo
+from sim_vehicle.scenarios import beacons, demo, jam, kidnap, mirror, outage, slip, spoof
 
 
 class Entry(NamedTuple):
@@ -19,6 +19,14 @@ class Entry(NamedTuple):
 _ENTRIES = {
     "beacons": Entry(beacons.DESCRIPTION, beacons.draw),
     "demo": Entry(demo.DESCRIPTION, demo.draw),
+    "jam": Entry(jam.DESCRIPTION, jam.draw),
+    "kidnap": Entry(kidnap.DESCRIPTION, kidnap.draw),
+    "late_fix": Entry(kidnap.LATE_DESCRIPTION, kidnap.draw_late),
+    "mirror": Entry(mirror.DESCRIPTION, mirror.draw),
+    "multipath": Entry(spoof.MULTIPATH_DESCRIPTION, spoof.draw_multipath),
+    "outage": Entry(outage.DESCRIPTION, outage.draw),
+    "slip": Entry(slip.DESCRIPTION, slip.draw),
+    "spoof": Entry(spoof.DESCRIPTION, spoof.draw),
 }
 
 

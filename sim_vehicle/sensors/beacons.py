@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim_vehicle.faults import Window
 from sim_vehicle.sensors.cadence import Cadence
 from sim_vehicle.world import Truth
 
@@ -19,6 +20,22 @@ class BeaconSite:
     north: float
     east: float
     down: float
+
+
+@dataclass(frozen=True, slots=True)
+class BeaconLoss:
+    """One beacon, by its number, does not answer in this window."""
+
+    beacon: int
+    window: Window
+
+
+@dataclass(frozen=True, slots=True)
+class StrayRange:
+    """One single range, the first one at or after ``time``, reads ``excess`` metres long."""
+
+    time: float
+    excess: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +56,10 @@ class RangerSettings:
         Measured over true distance.
     reach : float
         Metres beyond which a beacon does not answer.
+    losses : tuple[BeaconLoss, ...]
+        Which beacons fall silent, and when.
+    strays : tuple[StrayRange, ...]
+        Single ranges that are far off.
     """
 
     cadence: Cadence
@@ -48,6 +69,8 @@ class RangerSettings:
     outlier_mean: float = 4.0
     scale: float = 1.0
     reach: float = 500.0
+    losses: tuple[BeaconLoss, ...] = ()
+    strays: tuple[StrayRange, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +90,7 @@ class Ranger:
         self._settings = settings
         self._chance = chance
         self._sequence = 0
+        self._strays = sorted(settings.strays, key=lambda stray: stray.time)
 
     def measure(self, truth: Truth) -> BeaconReading | None:
         """Return the next beacon's range at the time of the truth; ``None``: it did not answer."""
@@ -76,9 +100,14 @@ class Ranger:
         luck, excess = float(self._chance.random()), float(self._chance.exponential())
         noise = settings.sigma * float(self._chance.standard_normal())
         true = math.dist((truth.north, truth.east, truth.down), (beacon.north, beacon.east, beacon.down))
-        if true > settings.reach:
+        if true > settings.reach or self._lost(beacon, truth.time):
             return None
         detour = settings.outlier_mean * excess if luck < settings.outliers else 0.0
+        if self._strays and self._strays[0].time <= truth.time:
+            detour += self._strays.pop(0).excess
         return BeaconReading(
             truth.time, beacon, max(0.0, settings.scale * true + detour + noise), self._sequence
         )
+
+    def _lost(self, beacon: BeaconSite, time: float) -> bool:
+        return any(loss.beacon == beacon.id and loss.window.holds(time) for loss in self._settings.losses)

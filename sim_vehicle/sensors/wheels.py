@@ -11,9 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim_vehicle.faults import Window
 from sim_vehicle.sensors.cadence import Cadence
 from sim_vehicle.sensors.correlated import Wander
 from sim_vehicle.world import Truth
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """In this window all wheels spin: they roll further than the ground passes by ``share`` of it."""
+
+    window: Window
+    share: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +44,8 @@ class WheelSettings:
     burst_interval, burst_length, burst_slip : float
         Mean seconds between two bursts of spinning, mean length of one (s), its mean share. 0 as interval:
         none.
+    slips : tuple[Slip, ...]
+        Spinning that is no matter of chance.
     """
 
     cadence: Cadence
@@ -46,6 +57,7 @@ class WheelSettings:
     burst_interval: float = 0.0
     burst_length: float = 1.0
     burst_slip: float = 0.2
+    slips: tuple[Slip, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +89,7 @@ class Wheels:
         """Return the counters at the time of the truth."""
         settings = self._settings
         burst = self._burst_share(truth.time)
+        burst += sum(slip.share for slip in settings.slips if slip.window.holds(truth.time))
         scales = (
             settings.scale * (1.0 + 0.5 * settings.imbalance),
             settings.scale * (1.0 - 0.5 * settings.imbalance),

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from sim_vehicle import scenarios
 from sim_vehicle.cli import application
 
 RUN = CliRunner()
@@ -15,7 +16,7 @@ RUN = CliRunner()
 def test_alone_it_lists_the_scenarios() -> None:
     result = RUN.invoke(application, [])
     assert result.exit_code == 0
-    assert [line.split()[0] for line in result.output.splitlines()] == ["beacons", "demo"]
+    assert [line.split()[0] for line in result.output.splitlines()] == scenarios.names()
 
 
 def test_help_teaches_every_option() -> None:

@@ -16,10 +16,17 @@ from sim_vehicle.configuration import Listening, text
 @pytest.mark.parametrize("can", [None, ("socketcan", "vcan0"), ("slcan", "/tmp/x/can0")])
 def test_the_daemon_accepts_it(name: str, can: tuple[str, str] | None, tmp_path: Path) -> None:
     path = tmp_path / "vehicle.toml"
-    path.write_text(text(scenarios.draw(name, 1), Listening("udpin:127.0.0.1:14550", can)))
+    drawn = scenarios.draw(name, 1)
+    path.write_text(text(drawn, Listening("udpin:127.0.0.1:14550", can)))
     configuration = config.load(path)
     assert configuration.vehicle.motion == "unicycle"
-    assert len(configuration.beacon) == 4
+    assert len(configuration.beacon) == (0 if drawn.ranger is None else len(drawn.ranger.beacons))
+
+
+def test_a_sensor_without_a_sigma_goes_by_what_its_readings_claim() -> None:
+    told = tomllib.loads(text(scenarios.draw("jam", 1), Listening()))
+    assert [sensor["kind"] for sensor in told["sensor"]] == ["position", "velocity"]
+    assert all("sigma" not in sensor for sensor in told["sensor"])
 
 
 def test_it_names_the_links_that_are_there() -> None:

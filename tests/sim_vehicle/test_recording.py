@@ -84,3 +84,12 @@ def test_without_a_bus_there_is_no_can_log(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b.tlog", "b.toml", "b_truth.csv"]
     assert (recorded.can_frames, recorded.truth_rows) == (0, 51)
     assert recorded.mavlink_frames > 100
+
+
+def test_what_befalls_the_drive_is_a_table_on_the_truths_clock(tmp_path: Path) -> None:
+    drawn = scenarios.draw("spoof", 1)
+    recorded = write(drawn, 1, 0.5, tmp_path / "s")
+    assert tmp_path / "s_events.csv" in recorded.files
+    assert (tmp_path / "s_events.csv").read_text() == (
+        "time_s,event\n1700000060.000000,spoof\n1700000360.000000,honest\n"
+    )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim_vehicle.chance import stream
-from sim_vehicle.faults import Fault, Faults, Kind
+from sim_vehicle.faults import Fault, Faults, Kind, Window
 from sim_vehicle.wire import Wire, WireSettings
 
 
@@ -50,3 +50,16 @@ def test_faults_drop_repeat_delay_and_corrupt() -> None:
     spoilt = [wire(settings, Fault("mavlink", Kind.CORRUPT)).carry(1.0, bytes(30))[0].frame][0]
     assert spoilt != bytes(30)
     assert len(spoilt) == 30
+
+
+def test_reordered_frames_pass_each_other_and_hold_up_nobody() -> None:
+    """1,000 frames 10 ms apart that lag by up to 0.2 s: most are overtaken, and the next one is on time."""
+    line = wire(WireSettings(latency=0.01), Fault("mavlink", Kind.REORDER, Window(stop=10.0), delay=0.2))
+    sent = [count / 100.0 for count in range(1000)]
+    arrivals = [line.carry(time, b"x")[0].time for time in sent]
+    lags = np.array(arrivals) - np.array(sent) - 0.01
+    assert lags.min() >= -1e-12
+    assert lags.max() < 0.2
+    assert np.mean(lags) == pytest.approx(0.1, abs=5.0 * 0.2 / math.sqrt(12.0 * 1000))
+    assert np.count_nonzero(np.diff(arrivals) < 0.0) > 300
+    assert line.carry(10.0, b"x")[0].time == pytest.approx(10.01)

@@ -2,8 +2,10 @@
 
 from service.estimator.measuring.heading import HEADING
 from service.estimator.measuring.kind import Kind, Measurement, Place, Refusal, Surroundings
+from service.estimator.measuring.landmarks import BEARING, RANGE_BEARING
 from service.estimator.measuring.position import POSITION, position_of
 from service.estimator.measuring.range import RANGE
+from service.estimator.measuring.surroundings import surroundings_of
 from service.estimator.measuring.velocity import VELOCITY
 
 KINDS: dict[str, Kind] = {
@@ -11,7 +13,18 @@ KINDS: dict[str, Kind] = {
     "velocity": VELOCITY,
     "range": RANGE,
     "heading": HEADING,
+    "bearing": BEARING,
+    "range_bearing": RANGE_BEARING,
 }
 """By the name that ``[[sensor]] kind`` gives them."""
 
-__all__ = ["KINDS", "Kind", "Measurement", "Place", "Refusal", "Surroundings", "position_of"]
+__all__ = [
+    "KINDS",
+    "Kind",
+    "Measurement",
+    "Place",
+    "Refusal",
+    "Surroundings",
+    "position_of",
+    "surroundings_of",
+]

@@ -32,9 +32,10 @@ class Place(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What is known of the place: the beacons, by their number."""
+    """What is known of the place: beacons, and the landmarks' north and east (metres), by their number."""
 
     beacons: dict[int, Beacon]
+    landmarks: dict[int, tuple[float, float]]
 
 
 class Bound(Protocol):

@@ -11,14 +11,14 @@ from sim_vehicle import scenarios
 
 
 def test_the_names_are_listed_with_a_line_each() -> None:
-    assert {"beacons", "demo"} <= set(scenarios.names())
+    assert {"beacons", "demo", "mirror", "kidnap", "spoof", "slip", "outage"} <= set(scenarios.names())
     for name in scenarios.names():
         assert "\n" not in scenarios.description(name)
         assert scenarios.draw(name, 1).name == name
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match="no scenario 'nosuch'; there are beacons, demo"):
+    with pytest.raises(ValueError, match="no scenario 'nosuch'; there are beacons, demo, jam"):
         scenarios.draw("nosuch", 1)
 
 
@@ -31,6 +31,15 @@ def test_a_seed_draws_the_same_and_another_seed_another(name: str) -> None:
     assert second.wheels is not None
     assert first.wheels.scale != second.wheels.scale
     assert first.clock != second.clock
+
+
+@pytest.mark.parametrize("name", scenarios.names())
+def test_events_lie_within_the_drive_and_in_order(name: str) -> None:
+    for seed in range(3):
+        drawn = scenarios.draw(name, seed)
+        times = [event.time for event in drawn.events]
+        assert times == sorted(times)
+        assert all(0.0 < time < drawn.seconds for time in times)
 
 
 def test_the_start_is_told_as_wrong_as_its_sigmas_say() -> None:

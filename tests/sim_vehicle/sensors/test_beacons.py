@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from sim_vehicle.chance import stream
-from sim_vehicle.sensors import BeaconSite, Cadence, Ranger, RangerSettings
+from sim_vehicle.faults import Window
+from sim_vehicle.sensors import BeaconLoss, BeaconSite, Cadence, Ranger, RangerSettings, StrayRange
 from tests.sim_vehicle.sensors.truths import straight
 
 SITES = (BeaconSite(3, 30.0, 40.0, 0.0), BeaconSite(9, 0.0, 0.0, -12.0))
@@ -56,3 +57,26 @@ def test_the_scale_stretches_the_distance() -> None:
     reading = ranger.measure(straight(0.0))
     assert reading is not None
     assert reading.distance == pytest.approx(53.5)
+
+
+def test_a_lost_beacon_is_silent_in_its_window_alone() -> None:
+    loss = BeaconLoss(9, Window(1.0, 2.0))
+    ranger = Ranger(RangerSettings(CADENCE, SITES, sigma=0.0, losses=(loss,)), stream(1, "r"))
+    heard = [ranger.measure(straight(count / 2.0)) for count in range(8)]
+    assert [None if reading is None else reading.beacon.id for reading in heard] == [
+        3,
+        9,
+        3,
+        None,
+        3,
+        9,
+        3,
+        9,
+    ]
+
+
+def test_a_stray_range_is_a_single_one() -> None:
+    settings = RangerSettings(CADENCE, SITES[1:], sigma=0.0, strays=(StrayRange(0.12, 300.0),))
+    ranger = Ranger(settings, stream(1, "r"))
+    heard = [ranger.measure(straight(count / 20.0, speed=0.0)) for count in range(6)]
+    assert [reading.distance for reading in heard if reading] == pytest.approx([12, 12, 12, 312, 12, 12])

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from sim_vehicle.chance import stream
-from sim_vehicle.sensors import Cadence, Wheels, WheelSettings
+from sim_vehicle.faults import Window
+from sim_vehicle.sensors import Cadence, Slip, Wheels, WheelSettings
 from tests.sim_vehicle.sensors.truths import straight
 
 CADENCE = Cadence(50.0)
@@ -56,3 +57,15 @@ def test_bursts_spin_the_wheels_now_and_then() -> None:
     # 600 s, a burst every 22 s: some 27, each of 2 s on average; wide bounds, the seed is fixed.
     assert 0.03 < spinning.mean() < 0.25
     assert shares[~spinning] == pytest.approx(0.0, abs=0.05)
+
+
+def test_a_declared_slip_lengthens_its_window_alone() -> None:
+    settings = WheelSettings(CADENCE, slips=(Slip(Window(10.0, 30.0), 0.3),))
+    wheels = Wheels(settings, stream(1, "wheels"))
+    counted = [wheels.measure(straight(count / 50.0)).left for count in range(2001)]
+    before, during, after = (
+        counted[end] - counted[begin] for begin, end in ((0, 499), (499, 1499), (1499, 2000))
+    )
+    assert before == pytest.approx(1.5 * 9.98, abs=0.002)
+    assert during == pytest.approx(1.3 * 1.5 * 20.0, abs=0.002)
+    assert after == pytest.approx(1.5 * 10.02, abs=0.002)

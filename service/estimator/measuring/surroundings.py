@@ -1,0 +1,23 @@
+"""What is known of the place that a configuration describes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from drivers.maps import landmarks
+from service.config import Configuration
+from service.estimator.measuring.kind import Surroundings
+
+
+def surroundings_of(configuration: Configuration) -> Surroundings:
+    """Return the beacons of a configuration, and the landmarks of its map.
+
+    Raises
+    ------
+    drivers.maps.landmarks.LandmarkError
+        The map of landmarks has become unreadable since the configuration was checked.
+    """
+    path = configuration.map.landmarks
+    return Surroundings(
+        {beacon.id: beacon for beacon in configuration.beacon}, landmarks.read(Path(path)) if path else {}
+    )
