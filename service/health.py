@@ -96,6 +96,10 @@ class HealthMonitor:
         self._last_reading = None
         self._placed = False
 
+    def heard(self, now: int) -> None:
+        """Note that an absolute measurement was used, though not by the belief: by the search that placed it."""
+        self._last_reading = now
+
     def judge(self, facts: Facts) -> HealthState:
         """Return the state at this tick and keep it with its reason."""
         self.state, self.reason = self._verdict(facts)

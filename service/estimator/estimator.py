@@ -174,6 +174,7 @@ class Estimator:
         if found is not None:
             self._filter.initialize(found)
             self._fusion.begin(self._fusion.time)
+            self.health.heard(self._fusion.time)
             self.reset_counter += not blind
         self._stopwatch.lap("search")
 

@@ -6,7 +6,7 @@ Whatever arrives, nothing is raised here. What cannot be used is counted with it
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from drivers.plausibility import implausible
@@ -114,10 +114,13 @@ class Intake:
         counts["control implausible"] = self._controls.implausible
         return {what: count for what, count in counts.items() if count}
 
-    def statuses(self, now: int) -> list[SensorStatus]:
-        """Return every sensor's status, heard or not; rates are over the time since the last call."""
+    def statuses(self, now: int, trust: Callable[[str], float | None] | None = None) -> list[SensorStatus]:
+        """Return every sensor's status, heard or not; rates are over the time since the last call.
+
+        ``trust`` says the log odds of a sensor by its name.
+        """
         silent = (SensorStatus(title, 0.0, None, 0, {}, None, None) for title in self._silent())
-        return [*self.records.statuses(now), *silent]
+        return [*self.records.statuses(now, trust), *silent]
 
     def _silent(self) -> list[str]:
         return [sensor.title for sensor in self._sensors if sensor.title not in self._heard]

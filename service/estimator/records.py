@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from service.estimate import SensorStatus
@@ -37,7 +38,7 @@ class SensorRecords:
             name = OTHERS
         return self._records.setdefault(name, SensorRecord())
 
-    def statuses(self, now: int) -> list[SensorStatus]:
+    def statuses(self, now: int, trust: Callable[[str], float | None] | None = None) -> list[SensorStatus]:
         """Return every record as it is published; the rates are over the time since the last call."""
         elapsed = SECOND if self._told is None else max(1, now - self._told)
         self._told = now
@@ -45,7 +46,7 @@ class SensorRecords:
             SensorStatus(
                 name,
                 round(record.arrivals * SECOND / elapsed, 2),
-                None,
+                None if trust is None else trust(name),
                 record.accepted,
                 dict(record.refused),
                 record.innovation,

@@ -1,0 +1,112 @@
+"""How large the errors of a source usually are against a prediction that does not use it: learned, not believed.
+
+A prediction with covariance P is compared with a measurement whose own claimed variance is r. If both were what they
+say, the innovation would have the covariance P + r. Neither is: a process noise is set with caution, and receivers
+claim what they like. So the innovation is taken to have
+
+    S(k, m) = k P + r + m² I
+
+where k says how cautious the prediction is and m is the level of the source's slow errors (multipath, a beacon's
+bias). Both come from a grid, and a discrete Bayes filter (Table 4.1) learns which pair it is. Errors that stay alike
+from one measurement to the next must not count twice: each adds its evidence times ``weight``, the share of an
+independent measurement that it is worth.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filters.discrete import DenseTransition, DiscreteBayesFilter
+
+Matrix = NDArray[np.float64]
+
+CAUTIONS = (1.0, 0.25, 0.0625)
+"""k: a prediction may be up to four times as good as it says, in standard deviations; it is never taken for worse."""
+
+LEVELS = (1.0, 0.25, 0.0625)
+"""m, as shares of the usual level."""
+
+
+class ErrorLevel:
+    """What is normal for one source.
+
+    Parameters
+    ----------
+    usual : float
+        Level that an honest source may well have, in the measurement's unit. A source that has shown less is judged by
+        it all the same: it may come into worse surroundings.
+    forgetting : float
+        Share by which what was learned goes back to the even prior with each independent measurement.
+
+    Raises
+    ------
+    ValueError
+        A level that is not positive, or a share outside [0, 1].
+    """
+
+    def __init__(self, usual: float, forgetting: float = 0.01) -> None:
+        if not (0.0 < usual < math.inf and 0.0 <= forgetting <= 1.0):
+            raise ValueError(
+                f"error level: usual must be positive and forgetting in [0, 1], got {usual}, {forgetting}"
+            )
+        self.usual = usual
+        self._forgetting = forgetting
+        pairs = [(caution, usual * level) for caution in CAUTIONS for level in LEVELS]
+        grid = np.array(pairs)
+        self._cautions: Matrix = grid[:, :1]
+        self._variances: Matrix = np.square(grid[:, 1:])
+        self._floor = usual * usual
+        self._filter = DiscreteBayesFilter[tuple[float, float]](pairs, np.eye(len(pairs)))
+
+    @property
+    def caution(self) -> float:
+        """Expected k: by how much the covariance of the prediction is to be scaled to be what it turned out to be."""
+        return float(self._filter.belief @ self._cautions[:, 0])
+
+    def surprise(self, residual: Matrix, spread: Matrix, noise: Matrix) -> float:
+        """Return by how many nats a residual is less likely than none, from an honest source.
+
+        Parameters
+        ----------
+        residual : (n,) float64
+            Measured minus predicted.
+        spread : (n, n) float64
+            P, in the measurement's space.
+        noise : (n,) float64
+            r; of several components the mean is taken.
+        """
+        turned, spreads = _principal(residual, spread)
+        variances = self._cautions * spreads + (noise.mean() + self._floor)
+        at_zero = self._filter.log_belief - 0.5 * np.log(variances).sum(axis=1)
+        found = at_zero - 0.5 * (turned * turned / variances).sum(axis=1)
+        return float(np.logaddexp.reduce(at_zero) - np.logaddexp.reduce(found))
+
+    def learn(self, residual: Matrix, spread: Matrix, noise: Matrix, weight: float) -> None:
+        """Learn from a residual of a source that is taken to be honest; it counts as ``weight`` measurements.
+
+        Raises
+        ------
+        ValueError
+            Numbers that are not finite; nothing was learned then.
+        """
+        turned, spreads = _principal(residual, spread)
+        variances = self._cautions * spreads + noise.mean() + self._variances
+        logs = -0.5 * (np.log(variances) + turned * turned / variances).sum(axis=1)
+        if not np.isfinite(logs).all():
+            raise ValueError(f"error level: finite numbers are needed, got residual {residual.tolist()}")
+        self._filter.update_log(weight * logs)
+        share = weight * self._forgetting
+        count = len(self._filter.states)
+        kept = DenseTransition((1.0 - share) * np.eye(count) + share / count)
+        self._filter.propagate(kept)
+
+
+def _principal(residual: Matrix, spread: Matrix) -> tuple[Matrix, Matrix]:
+    """Return residual and spread along the axes of the spread."""
+    if residual.size == 1:
+        return residual, spread[0]
+    values, vectors = np.linalg.eigh(spread)
+    return residual @ vectors, np.maximum(values, 0.0)

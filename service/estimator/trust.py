@@ -1,0 +1,283 @@
+"""Trust: which sensors tell the truth, whatever accuracy they claim.
+
+A binary Bayes filter in log odds (Table 4.2) for every group of sensors that would lie together: a receiver's position
+and velocity, one beacon, one compass. The evidence is what the group's :class:`~service.estimator.witnesses.Witnesses`,
+who do not listen to it, make of its measurements: how much less likely the innovation is than none at all, given how
+wrong witnesses and group usually are (:class:`filters.error_level.ErrorLevel`). A liar's measurement lies anywhere, so
+an innovation :data:`DOUBT` nats less likely than none speaks neither for nor against.
+
+The log odds are kept within :data:`LIMIT`, what one second says within :data:`WORST` and :data:`BEST`: a liar is found
+out two to three seconds after its first great lie, one wrong reading flags nobody, and trust is earned back in 10 to
+13 s. A group that has never agreed with its witness is not judged: then it may be the belief that is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from drivers.sample import Sample
+from filters.belief import Evidence
+from filters.binary import BinaryBayesFilter
+from filters.error_level import ErrorLevel
+from filters.kalman import Matrix
+from filters.motion.slow import RandomWalk
+from filters.motion.unicycle import Unicycle, UnicycleControl
+from filters.particle import ParticleFilter
+from filters.regularization import root
+from filters.sensing import Heading, Position, Range, Velocity
+from service.config import Configuration
+from service.estimator.measuring import Measurement
+from service.estimator.track import SECOND
+from service.estimator.vehicle import Vehicle
+from service.estimator.witnesses import SPAN, Testimony, Witnesses, gaussian_of
+
+MOST_GROUPS = 16
+"""Groups beyond this many are not judged."""
+
+LIMIT = 6.0
+"""Log odds: one in 400 that a trusted sensor lies."""
+
+FLAGGED, EARNED = -5.0, 2.0
+"""Log odds below which a group is no longer trusted, and above which it is trusted again."""
+
+CALM = 3.0
+"""Log odds from which nobody is under suspicion, and a group has shown that it agrees."""
+
+WORST, BEST = -6.0, 0.64
+"""Log odds that a second of readings adds at most, against a group and for it."""
+
+DOUBT, DOUBT_OF_A_LIAR = 8.0, 5.0
+"""Nats: of an innovation that speaks neither way, 4 standard deviations; 3.2 for a group that has been caught."""
+
+LEARNING = 10.0
+"""Seconds of readings that teach as much about the usual errors as one independent reading."""
+
+MARGIN = 4.0
+"""Nats by which a witness may be contradicted more than another group's and still accuse."""
+
+POISONED = 9.2
+"""Squared distance of the belief from the witness, in the witness's own measure, above which it was led away (99 %)."""
+
+NARROW = 0.35
+"""Radians: a heading known better than this makes a witness."""
+
+USUAL: dict[type, float] = {Position: 5.0, Velocity: 0.5, Range: 1.5, Heading: 0.15}
+"""Slow errors that an honest sensor may have whatever it claims: multipath of 5 m, a beacon's bias; m, m/s, rad."""
+
+
+@dataclass
+class Group:
+    """One group: sensors that lie together.
+
+    Attributes
+    ----------
+    place : int
+        Of its log odds and of its witnesses.
+    levels : dict[str, ErrorLevel]
+        By sensor: what is normal.
+    heard : dict[str, int]
+        By sensor: when, nanoseconds.
+    leading : bool
+        Whether a sensor of it says where the vehicle is; then only such a one speaks for the group.
+    agreed, flagged : bool
+        Whether it has ever earned trust, and whether it has lost it.
+    """
+
+    place: int
+    levels: dict[str, ErrorLevel] = field(default_factory=dict[str, ErrorLevel])
+    heard: dict[str, int] = field(default_factory=dict[str, int])
+    leading: bool = False
+    agreed: bool = False
+    flagged: bool = False
+
+
+def group_of(name: str, sample: Sample) -> str:
+    """Return the group of a sensor: a receiver's position and velocity are one, each beacon is its own."""
+    kind, _, rest = name.partition("/")
+    return (
+        f"receiver/{rest}/{sample.source}" if kind in ("position", "velocity") else f"{name}/{sample.source}"
+    )
+
+
+class Trust:
+    """Who is believed; a :class:`~service.estimator.companion.Companion` that is also asked before each measurement.
+
+    Parameters
+    ----------
+    motion : Unicycle
+        How the vehicle moves.
+    slow : list[RandomWalk]
+        Slow states beside it.
+    belief : ParticleFilter
+        Witnesses begin as it is.
+    control : callable
+        What was rolled and turned between two times.
+
+    seed : int
+        Of the particles that are drawn where a group has led the belief away.
+    """
+
+    def __init__(
+        self,
+        motion: Unicycle,
+        slow: list[RandomWalk],
+        belief: ParticleFilter[Any],
+        control: Callable[[int, int], UnicycleControl],
+        seed: int,
+    ) -> None:
+        self._undo: tuple[Matrix, Matrix] | None = None
+        self._seed = seed
+        self._taken_back = 0
+        self._motion = motion
+        self._belief = belief
+        self._control = control
+        self._witnesses = Witnesses(motion, slow, MOST_GROUPS)
+        self._odds = BinaryBayesFilter(0.5, (MOST_GROUPS,), LIMIT)
+        self._groups: dict[str, Group] = {}
+        self._by_name: dict[str, Group] = {}
+        self._time = 0
+
+    def log_odds(self, name: str) -> float | None:
+        """Return the log odds of the sensor ``name``; ``None`` while it is not judged."""
+        group = self._by_name.get(name)
+        return None if group is None or not group.agreed else float(self._odds.log_odds[group.place])
+
+    # --- a companion of the belief --------------------------------------------------------------------------------
+
+    def started(self, time: int) -> None:
+        """Dismiss the witnesses: they are of another belief."""
+        self._time = time
+        self._witnesses.clear()
+
+    def moved(self, start: int, end: int) -> None:
+        """Move the witnesses, and have new ones begin when it is time."""
+        self._time = end
+        self._witnesses.move(self._control(start, end), (end - start) / SECOND)
+        trusted = [group for group in self._groups.values() if not group.flagged]
+        newest = [self._witnesses.newest(group.place) for group in trusted]
+        due = [
+            group
+            for group, began in zip(trusted, newest, strict=True)
+            if began is None or end - began >= SPAN // 2
+        ]
+        if due and all(not g.agreed or self._odds.log_odds[g.place] >= CALM for g in trusted):
+            self._begin(due)
+
+    def weighed(self, time: int, measured: Measurement, evidence: Evidence, outlier: bool) -> None:
+        """Let the witnesses of all other groups hear what was weighed."""
+        group = self._by_name.get(measured.name)
+        if group is not None:
+            self._witnesses.hear(group.place, measured)
+
+    # --- a judge --------------------------------------------------------------------------------------------------
+
+    def admits(self, time: int, sample: Sample, measured: Measurement) -> bool:
+        """Judge a measurement by its group's witness, and say whether the group is believed."""
+        group = self._group(measured, sample)
+        if group is None:
+            return True
+        last = group.heard.get(measured.name, time - SECOND)
+        group.heard[measured.name] = time
+        group.leading |= measured.absolute
+        testimony = self._witnesses.testify(group.place, measured)
+        if testimony is None:
+            if not group.flagged or self._witnesses.judging(group.place) is None:
+                self._begin([group])
+            return not group.flagged
+        weight = min(1.0, max(0.0, (time - last) / SECOND))
+        self._judge(group, measured, testimony, weight)
+        return not group.flagged
+
+    def take_back(self) -> dict[str, Matrix] | None:
+        """Return particles for the belief to begin anew from, if a group that was just flagged has led it away."""
+        if self._undo is None:
+            return None
+        (mean, covariance), self._undo = self._undo, None
+        for name, variance in self._motion.conditional_variances.items():
+            row = self._belief.names.index(name)
+            covariance[row, row] -= (
+                variance  # the motion model has that much beside the particles' own values
+            )
+        self._taken_back += 1
+        random = np.random.Generator(np.random.Philox(key=(self._seed, self._taken_back)))
+        drawn = mean[:, None] + root(covariance) @ random.standard_normal((mean.size, self._belief.count))
+        return dict(zip(self._belief.names, drawn, strict=True))
+
+    def _group(self, measured: Measurement, sample: Sample) -> Group | None:
+        name = group_of(measured.name, sample)
+        group = self._groups.get(name)
+        if group is None:
+            if len(self._groups) >= MOST_GROUPS or type(measured.model) not in USUAL:
+                return None
+            group = self._groups[name] = Group(len(self._groups))
+        if measured.name not in group.levels:
+            group.levels[measured.name] = ErrorLevel(USUAL[type(measured.model)])
+            self._by_name[measured.name] = group
+        return group
+
+    def _judge(self, group: Group, measured: Measurement, testimony: Testimony, weight: float) -> None:
+        level = group.levels[measured.name]
+        doubt = DOUBT_OF_A_LIAR if group.flagged else DOUBT
+        verdict = doubt - level.surprise(*testimony)
+        if verdict > 0.0 and not group.flagged:
+            level.learn(*testimony, weight / LEARNING)
+        if verdict > 0.0 and group.leading and not measured.absolute:
+            return
+        if verdict < 0.0 and not (group.agreed and self._accuses(group)):
+            return
+        self._odds.add(weight * min(BEST, max(WORST, verdict)), group.place)
+        odds = float(self._odds.log_odds[group.place])
+        group.agreed |= odds >= CALM
+        if group.flagged:
+            group.flagged = odds < EARNED
+        elif odds <= FLAGGED:
+            group.flagged = True
+            self._take_back(group, measured, testimony, level.caution)
+
+    def _accuses(self, group: Group) -> bool:
+        """Say whether the group's own witness is the one that explains the others best."""
+        others = [
+            self._witnesses.contradiction(other.place)
+            for other in self._groups.values()
+            if other is not group and other.agreed and not other.flagged
+        ]
+        return self._witnesses.contradiction(group.place) <= min(others, default=math.inf) + MARGIN
+
+    def _take_back(self, group: Group, measured: Measurement, testimony: Testimony, caution: float) -> None:
+        """Have the belief begin anew as the witness has it, if it was led away from there."""
+        witness = self._witnesses.gaussian(group.place)
+        if witness is None:
+            return
+        mean, covariance = witness
+        moments = self._belief.moments()
+        away = moments.mean[:2] - mean[:2]
+        spread = caution * covariance[:2, :2]
+        if measured.absolute and float(away @ np.linalg.solve(spread, away)) > POISONED:
+            self._undo = witness
+
+    def _begin(self, groups: list[Group]) -> None:
+        moments = self._belief.moments()
+        if float(moments.variance[2]) > NARROW**2:
+            return
+        gaussian = gaussian_of(self._belief, self._motion.conditional_variances)
+        for group in groups:
+            self._witnesses.begin(group.place, self._time, *gaussian)
+
+
+def trust_of(
+    configuration: Configuration, vehicle: Vehicle, belief: ParticleFilter[Any], seed: int
+) -> Trust | None:
+    """Return who judges the sensors of a vehicle; ``None`` where that is switched off or nothing could be a witness.
+
+    A witness must know the motion: of a vehicle without odometry nobody can say where it has gone without the group
+    that is to be judged.
+    """
+    motion = vehicle.motion
+    if not (configuration.honesty.trust and isinstance(motion, Unicycle)):
+        return None
+    return Trust(motion, vehicle.slow_states, belief, vehicle.control, seed)

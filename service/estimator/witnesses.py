@@ -1,0 +1,167 @@
+"""Witnesses: for every group of sensors two filters that do not listen to it, and began a while ago.
+
+A witness takes every control and what all other groups measure, so it says where the vehicle is without the group that
+is to be judged. It begins as the belief's own Gaussian; what the group told the belief before that is in it, so it is
+worth something only from a while back. The two of a group begin in turns, ``SPAN / 2`` apart: one of them always is
+between ``SPAN / 2`` and ``SPAN`` old. While anyone is under suspicion none begins anew: the
+belief may be wrong already.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filters.kalman import Matrix
+from filters.linearised.bank import BATCHED, GaussianBank
+from filters.motion.slow import RandomWalk
+from filters.motion.unicycle import Unicycle
+from filters.particle import ParticleFilter
+from service.estimator.measuring import Measurement
+from service.estimator.track import SECOND
+
+SPAN = 120 * SECOND
+"""How old a witness gets. Half of it must be longer than the slowest drag-off takes to be seen: 20 m at 0.5 m/s."""
+
+GATE = 0.9999
+"""What a witness is sure to be an outlier it leaves out."""
+
+MOST_NIS = 25.0
+"""One measurement contradicts a witness by this much at most."""
+
+MEMORY = 20.0
+"""Seconds over which contradictions are summed up."""
+
+SLOTS = 2
+SAMPLE = 2048
+"""The belief's covariance is taken over about so many particles."""
+
+_HEADING = 2
+
+
+class Testimony(NamedTuple):
+    """What a witness says of a measurement of the group that it does not listen to.
+
+    Attributes
+    ----------
+    residual : (n,) float64
+        Measured minus what it expected.
+    spread : (n, n) float64
+        Covariance of what it expected.
+    noise : (n,) float64
+        Variances of the measurement, of one that repeats no other's errors.
+    """
+
+    residual: Matrix
+    spread: Matrix
+    noise: Matrix
+
+
+class Witnesses:
+    """The witnesses of up to ``groups`` groups, as one bank: group g has the members 2 g and 2 g + 1.
+
+    Parameters
+    ----------
+    motion : Unicycle
+        How the vehicle moves.
+    slow : list[RandomWalk]
+        Slow states beside it.
+    groups : int
+        For how many groups there is room.
+    """
+
+    def __init__(self, motion: Unicycle, slow: list[RandomWalk], groups: int) -> None:
+        self.bank = GaussianBank(motion, slow, SLOTS * groups)
+        self._began = np.zeros(SLOTS * groups, np.int64)
+        self._contradiction: Matrix = np.zeros(SLOTS * groups)
+
+    def clear(self) -> None:
+        """Dismiss all of them."""
+        self.bank.live[:] = False
+
+    def move(self, control: Any, duration: float) -> None:
+        """Move them by a control."""
+        self.bank.predict(control, duration)
+        self._contradiction *= math.exp(-duration / MEMORY)
+
+    def hear(self, group: int, measured: Measurement) -> None:
+        """Let all but the group's own take its measurement, and note how it contradicts them."""
+        if type(measured.model) not in BATCHED:
+            return
+        chosen = self.bank.live.copy()
+        chosen[SLOTS * group : SLOTS * (group + 1)] = False
+        if not chosen.any():
+            return
+        expectations = self.bank.expect(measured.model, measured.value)
+        nis = self.bank.correct(expectations, chosen, GATE).nis[chosen]
+        excess = np.minimum(nis, MOST_NIS) - expectations.residual.shape[1]
+        self._contradiction[chosen] += excess / measured.repeats
+
+    def judging(self, group: int) -> int | None:
+        """Return the member that judges the group: the older one; ``None`` if there is none."""
+        members = [m for m in range(SLOTS * group, SLOTS * (group + 1)) if self.bank.live[m]]
+        return min(members, key=lambda member: int(self._began[member]), default=None)
+
+    def newest(self, group: int) -> int | None:
+        """Return when the group's younger witness began, nanoseconds."""
+        began = [
+            int(self._began[SLOTS * group + k]) for k in range(SLOTS) if self.bank.live[SLOTS * group + k]
+        ]
+        return max(began, default=None)
+
+    def contradiction(self, group: int) -> float:
+        """Return how far the others contradict the group's witness, nats over the last seconds: 0 is normal."""
+        member = self.judging(group)
+        return math.inf if member is None else 0.5 * float(self._contradiction[member])
+
+    def testify(self, group: int, measured: Measurement) -> Testimony | None:
+        """Say what the group's witness makes of a measurement of it; ``None`` without a witness."""
+        member = self.judging(group)
+        if member is None or type(measured.model) not in BATCHED:
+            return None
+        said = self.bank.expect(measured.model, measured.value)
+        jacobian = said.jacobian[member]
+        spread = jacobian @ self.bank.covariance[member] @ jacobian.T
+        return Testimony(said.residual[member], spread, said.noise[member] / measured.repeats)
+
+    def begin(self, group: int, time: int, mean: Matrix, covariance: Matrix) -> None:
+        """Have a witness of the group begin at ``time`` with this Gaussian, in the place of the older one."""
+        members = range(SLOTS * group, SLOTS * (group + 1))
+        member = min(members, key=lambda m: int(self._began[m]) if self.bank.live[m] else -(2**62))
+        self.bank.set(member, mean, covariance)
+        self._began[member] = time
+        self._contradiction[member] = 0.0
+
+    def gaussian(self, group: int) -> tuple[Matrix, Matrix] | None:
+        """Return mean and covariance of the judging witness."""
+        member = self.judging(group)
+        if member is None:
+            return None
+        return self.bank.mean[member].copy(), self.bank.covariance[member].copy()
+
+
+def gaussian_of(belief: ParticleFilter[Any], given_path: dict[str, float]) -> tuple[Matrix, Matrix]:
+    """Return mean and covariance of a belief over all its dimensions, over an even sample of its particles.
+
+    Parameters
+    ----------
+    given_path : dict[str, float]
+        Variances of the marginalised dimensions beside the spread of the particles' own values.
+    """
+    step = max(1, belief.count // SAMPLE)
+    weights = belief.weights[::step].astype(np.float64)
+    weights /= weights.sum()
+    columns: NDArray[np.float64] = belief.columns[:, : belief.count : step].astype(np.float64)
+    heading = columns[_HEADING]
+    centre = math.atan2(weights @ np.sin(heading), weights @ np.cos(heading))
+    columns[_HEADING] = centre + np.remainder(heading - centre + math.pi, 2.0 * math.pi) - math.pi
+    mean = columns @ weights
+    away = columns - mean[:, None]
+    covariance = (away * weights) @ away.T
+    for name, variance in given_path.items():
+        row = belief.names.index(name)
+        covariance[row, row] += variance
+    return mean, 0.5 * (covariance + covariance.T)
