@@ -84,6 +84,14 @@ class ErrorLevel:
         found = at_zero - 0.5 * (turned * turned / variances).sum(axis=1)
         return float(np.logaddexp.reduce(at_zero) - np.logaddexp.reduce(found))
 
+    def information(self, nats: float, noise: Matrix) -> float:
+        """Return what is left of ``nats`` of evidence when the measurement itself claims a noise; not below zero.
+
+        A liar's measurement lies anywhere. That an honest one lies at all near the prediction is the less surprising,
+        by the logarithm of the standard deviation in each dimension, the wider it says that it may lie.
+        """
+        return max(0.0, nats - 0.5 * float(np.log1p(noise / self._floor).sum()))
+
     def learn(self, residual: Matrix, spread: Matrix, noise: Matrix, weight: float) -> None:
         """Learn from a residual of a source that is taken to be honest; it counts as ``weight`` measurements.
 

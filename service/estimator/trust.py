@@ -14,7 +14,7 @@ out two to three seconds after its first great lie, one wrong reading flags nobo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,19 +25,20 @@ from filters.belief import Evidence
 from filters.binary import BinaryBayesFilter
 from filters.error_level import ErrorLevel
 from filters.kalman import Matrix
-from filters.motion.slow import RandomWalk
+from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from filters.regularization import root
 from filters.sensing import Heading, Position, Range, Velocity
 from service.config import Configuration
+from service.estimator.lie import Lie
 from service.estimator.measuring import Measurement
 from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 from service.estimator.witnesses import SPAN, Testimony, Witnesses, gaussian_of
 
-MOST_GROUPS = 16
-"""Groups beyond this many are not judged."""
+MOST_GROUPS, MOST_SENSORS = 16, 32
+"""Groups and sensors beyond so many are not judged."""
 
 LIMIT = 6.0
 """Log odds: one in 400 that a trusted sensor lies."""
@@ -48,8 +49,10 @@ FLAGGED, EARNED = -5.0, 2.0
 CALM = 3.0
 """Log odds from which nobody is under suspicion, and a group has shown that it agrees."""
 
-WORST, BEST = -6.0, 0.64
-"""Log odds that a second of readings adds at most, against a group and for it."""
+BEST = 0.64
+WORST: dict[type, float] = {Position: -8.0, Velocity: -3.0, Range: -2.0, Heading: -2.0}
+"""Log odds that a second of readings adds at most, for a sensor and against it: BEST / (BEST - WORST) is the share of
+wild readings that one lives with for ever. Among ranges they are many, among positions few."""
 
 DOUBT, DOUBT_OF_A_LIAR = 8.0, 5.0
 """Nats: of an innovation that speaks neither way, 4 standard deviations; 3.2 for a group that has been caught."""
@@ -71,29 +74,58 @@ USUAL: dict[type, float] = {Position: 5.0, Velocity: 0.5, Range: 1.5, Heading: 0
 
 
 @dataclass
-class Group:
-    """One group: sensors that lie together.
+class Judged:
+    """One sensor.
 
     Attributes
     ----------
     place : int
-        Of its log odds and of its witnesses.
-    levels : dict[str, ErrorLevel]
-        By sensor: what is normal.
-    heard : dict[str, int]
-        By sensor: when, nanoseconds.
-    leading : bool
-        Whether a sensor of it says where the vehicle is; then only such a one speaks for the group.
+        Of its log odds.
+    level : ErrorLevel
+        What errors are normal for it.
+    absolute : bool
+        Whether it says where the vehicle is.
+    worst : float
+        Log odds that a second of readings takes from it at most.
+    heard : int or None
+        When, nanoseconds.
     agreed, flagged : bool
         Whether it has ever earned trust, and whether it has lost it.
     """
 
     place: int
-    levels: dict[str, ErrorLevel] = field(default_factory=dict[str, ErrorLevel])
-    heard: dict[str, int] = field(default_factory=dict[str, int])
-    leading: bool = False
+    level: ErrorLevel
+    absolute: bool
+    worst: float
+    heard: int | None = None
     agreed: bool = False
     flagged: bool = False
+
+    def weight(self, time: int) -> float:
+        """Return how much of a second has passed since the reading before, at most one, and note this one."""
+        elapsed = 1.0 if self.heard is None else (time - self.heard) / SECOND
+        self.heard = time
+        return min(1.0, max(0.0, elapsed))
+
+
+@dataclass
+class Group:
+    """Sensors that would lie together; those that do not say where the vehicle is follow those that do."""
+
+    place: int
+    sensors: dict[str, Judged] = field(default_factory=dict[str, Judged])
+    lie: Lie = field(default_factory=Lie)
+
+    @property
+    def flagged(self) -> bool:
+        """Whether one of it that says where the vehicle is has been caught, or all of it."""
+        leading = [sensor.flagged for sensor in self.sensors.values() if sensor.absolute]
+        return any(leading) if leading else all(sensor.flagged for sensor in self.sensors.values())
+
+    @property
+    def agreed(self) -> bool:
+        """Whether one of it has ever earned trust."""
+        return any(sensor.agreed for sensor in self.sensors.values())
 
 
 def group_of(name: str, sample: Sample) -> str:
@@ -111,7 +143,7 @@ class Trust:
     ----------
     motion : Unicycle
         How the vehicle moves.
-    slow : list[RandomWalk]
+    slow : sequence of RandomWalk or Learned
         Slow states beside it.
     belief : ParticleFilter
         Witnesses begin as it is.
@@ -125,7 +157,7 @@ class Trust:
     def __init__(
         self,
         motion: Unicycle,
-        slow: list[RandomWalk],
+        slow: Sequence[SlowState],
         belief: ParticleFilter[Any],
         control: Callable[[int, int], UnicycleControl],
         seed: int,
@@ -137,15 +169,17 @@ class Trust:
         self._belief = belief
         self._control = control
         self._witnesses = Witnesses(motion, slow, MOST_GROUPS)
-        self._odds = BinaryBayesFilter(0.5, (MOST_GROUPS,), LIMIT)
+        self._odds = BinaryBayesFilter(0.5, (MOST_SENSORS,), LIMIT)
         self._groups: dict[str, Group] = {}
         self._by_name: dict[str, Group] = {}
+        self._sensors = 0
         self._time = 0
 
     def log_odds(self, name: str) -> float | None:
         """Return the log odds of the sensor ``name``; ``None`` while it is not judged."""
         group = self._by_name.get(name)
-        return None if group is None or not group.agreed else float(self._odds.log_odds[group.place])
+        sensor = None if group is None else group.sensors.get(name)
+        return float(self._odds.log_odds[sensor.place]) if sensor is not None and sensor.agreed else None
 
     # --- a companion of the belief --------------------------------------------------------------------------------
 
@@ -165,8 +199,11 @@ class Trust:
             for group, began in zip(trusted, newest, strict=True)
             if began is None or end - began >= SPAN // 2
         ]
-        if due and all(not g.agreed or self._odds.log_odds[g.place] >= CALM for g in trusted):
+        if due and all(self._calm(sensor) for group in trusted for sensor in group.sensors.values()):
             self._begin(due)
+
+    def _calm(self, sensor: Judged) -> bool:
+        return sensor.flagged or not sensor.agreed or self._odds.log_odds[sensor.place] >= CALM
 
     def weighed(self, time: int, measured: Measurement, evidence: Evidence, outlier: bool) -> None:
         """Let the witnesses of all other groups hear what was weighed."""
@@ -177,21 +214,21 @@ class Trust:
     # --- a judge --------------------------------------------------------------------------------------------------
 
     def admits(self, time: int, sample: Sample, measured: Measurement) -> bool:
-        """Judge a measurement by its group's witness, and say whether the group is believed."""
+        """Judge a measurement by its group's witness, and say whether its sensor is believed."""
         group = self._group(measured, sample)
         if group is None:
             return True
-        last = group.heard.get(measured.name, time - SECOND)
-        group.heard[measured.name] = time
-        group.leading |= measured.absolute
+        sensor = group.sensors[measured.name]
+        weight = sensor.weight(time)
         testimony = self._witnesses.testify(group.place, measured)
         if testimony is None:
-            if not group.flagged or self._witnesses.judging(group.place) is None:
-                self._begin([group])
-            return not group.flagged
-        weight = min(1.0, max(0.0, (time - last) / SECOND))
-        self._judge(group, measured, testimony, weight)
-        return not group.flagged
+            self._begin([group])
+        else:
+            self._judge(group, sensor, testimony, weight)
+            group.lie.hear(time, testimony, weight, sensor.absolute)
+        if group.flagged and not sensor.absolute:
+            return not sensor.flagged and group.lie.leaves_alone
+        return not sensor.flagged
 
     def take_back(self) -> dict[str, Matrix] | None:
         """Return particles for the belief to begin anew from, if a group that was just flagged has led it away."""
@@ -211,33 +248,38 @@ class Trust:
     def _group(self, measured: Measurement, sample: Sample) -> Group | None:
         name = group_of(measured.name, sample)
         group = self._groups.get(name)
+        if type(measured.model) not in USUAL or (group is None and len(self._groups) >= MOST_GROUPS):
+            return None
         if group is None:
-            if len(self._groups) >= MOST_GROUPS or type(measured.model) not in USUAL:
-                return None
             group = self._groups[name] = Group(len(self._groups))
-        if measured.name not in group.levels:
-            group.levels[measured.name] = ErrorLevel(USUAL[type(measured.model)])
+        if measured.name not in group.sensors:
+            if self._sensors >= MOST_SENSORS:
+                return None
+            kind = type(measured.model)
+            group.sensors[measured.name] = Judged(
+                self._sensors, ErrorLevel(USUAL[kind]), measured.absolute, WORST[kind]
+            )
+            self._sensors += 1
             self._by_name[measured.name] = group
         return group
 
-    def _judge(self, group: Group, measured: Measurement, testimony: Testimony, weight: float) -> None:
-        level = group.levels[measured.name]
-        doubt = DOUBT_OF_A_LIAR if group.flagged else DOUBT
-        verdict = doubt - level.surprise(*testimony)
-        if verdict > 0.0 and not group.flagged:
-            level.learn(*testimony, weight / LEARNING)
-        if verdict > 0.0 and group.leading and not measured.absolute:
+    def _judge(self, group: Group, sensor: Judged, testimony: Testimony, weight: float) -> None:
+        doubt = DOUBT_OF_A_LIAR if sensor.flagged else DOUBT
+        verdict = sensor.level.information(doubt, testimony.noise) - sensor.level.surprise(*testimony)
+        if verdict > 0.0 and not sensor.flagged:
+            sensor.level.learn(*testimony, weight / LEARNING)
+        if verdict < 0.0 and not (sensor.agreed and self._accuses(group)):
             return
-        if verdict < 0.0 and not (group.agreed and self._accuses(group)):
-            return
-        self._odds.add(weight * min(BEST, max(WORST, verdict)), group.place)
-        odds = float(self._odds.log_odds[group.place])
-        group.agreed |= odds >= CALM
-        if group.flagged:
-            group.flagged = odds < EARNED
+        self._odds.add(weight * min(BEST, max(sensor.worst, verdict)), sensor.place)
+        odds = float(self._odds.log_odds[sensor.place])
+        sensor.agreed |= odds >= CALM
+        if sensor.flagged:
+            sensor.flagged = odds < EARNED
         elif odds <= FLAGGED:
-            group.flagged = True
-            self._take_back(group, measured, testimony, level.caution)
+            sensor.flagged = True
+            group.lie.begin()
+            if sensor.absolute:
+                self._look_back(group, sensor.level.caution)
 
     def _accuses(self, group: Group) -> bool:
         """Say whether the group's own witness is the one that explains the others best."""
@@ -248,16 +290,15 @@ class Trust:
         ]
         return self._witnesses.contradiction(group.place) <= min(others, default=math.inf) + MARGIN
 
-    def _take_back(self, group: Group, measured: Measurement, testimony: Testimony, caution: float) -> None:
+    def _look_back(self, group: Group, caution: float) -> None:
         """Have the belief begin anew as the witness has it, if it was led away from there."""
         witness = self._witnesses.gaussian(group.place)
         if witness is None:
             return
         mean, covariance = witness
-        moments = self._belief.moments()
-        away = moments.mean[:2] - mean[:2]
+        away = self._belief.moments().mean[:2] - mean[:2]
         spread = caution * covariance[:2, :2]
-        if measured.absolute and float(away @ np.linalg.solve(spread, away)) > POISONED:
+        if float(away @ np.linalg.solve(spread, away)) > POISONED:
             self._undo = witness
 
     def _begin(self, groups: list[Group]) -> None:
