@@ -47,7 +47,8 @@ MARGINALISED = {
 def sensor_states(configuration: Configuration) -> list[RandomWalk]:
     """Return the slow states that the sensors ask for, each once."""
     return [
-        RandomWalk(name, DELAY_WALK if name == DELAY else SENSOR_WALK) for name in _sensor_sigmas(configuration)
+        RandomWalk(name, DELAY_WALK if name == DELAY else SENSOR_WALK)
+        for name in _sensor_sigmas(configuration)
     ]
 
 

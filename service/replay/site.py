@@ -11,15 +11,35 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from drivers.sample import BeaconPlace, GeodeticPosition, Heading, LocalPosition, Range, Velocity
+from drivers.sample import (
+    BeaconPlace,
+    GeodeticPosition,
+    Heading,
+    LocalPosition,
+    MotorSpeed,
+    Odometer,
+    Presence,
+    Range,
+    Speed,
+    Velocity,
+)
 from service.config import CanLink, Configuration, Link, MavlinkLink, Sensor, Site, Start, Vehicle, load, site
 from service.replay.sources import kind_of, merged, open_log
 from service.replay.surroundings import area_about, beacons_of
 
 SITL_GNSS_DELAY_MS = 90.0
 """ArduPilot's simulator reports a fix this long after it was true."""
+
+ROVER_GYRO_DELAY_MS = 56.0
+"""What a second-order Butterworth low pass delays: sqrt(2) / (2 pi f), at INS_GYRO_FILTER's 4 Hz for rovers and boats."""
+
+_ROVERS = (10, 11)
+"""MAV_TYPE of ground rovers and surface boats."""
+
+_ODOMETRY = {Odometer, Speed, MotorSpeed}
+"""Without one of them a receiver's delay does not show: nothing else tells how the vehicle moves."""
 
 _KINDS: tuple[tuple[str, tuple[type, ...]], ...] = (
     ("position", (GeodeticPosition, LocalPosition)),
@@ -114,9 +134,15 @@ def _filled(partial: Site, logs: tuple[Path, ...], notes: list[str]) -> Configur
     for sensor in sensors:
         words = f"sensor filled in from the log: {sensor.kind}"
         if sensor.delay_ms:
-            words += f", delay_ms = {sensor.delay_ms:.0f} (SIM_STATE seen: ArduPilot's simulator)"
+            words += f", delay_ms = {sensor.delay_ms:.0f}, correlation_s = 0 (SIM_STATE seen: ArduPilot's simulator)"
         notes.append(words + ("".join(f', estimate = ["{state}"]' for state in sensor.estimate)))
     filled = _placed(partial, partial.configuration(vehicle, links, sensors), contents, notes)
+    if contents.simulated and contents.rover and "motion" not in partial.model_fields_set:
+        notes.append(
+            f"yaw_rate_delay_ms = {ROVER_GYRO_DELAY_MS:.0f}: ArduPilot filters a rover's gyro at 4 Hz"
+        )
+        motion = filled.motion.model_copy(update={"yaw_rate_delay_ms": ROVER_GYRO_DELAY_MS})
+        filled = filled.model_copy(update={"motion": motion})
     if "loop" in partial.model_fields_set or contents.horizon_ms <= filled.loop.horizon_ms:
         return filled
     notes.append(
@@ -150,6 +176,8 @@ class Contents(NamedTuple):
 
     Attributes
     ----------
+    rover : bool
+        Whether an autopilot said that it drives on the ground or on water.
     places : list[BeaconPlace]
         What was said of the beacons' places.
     ranges : list[float]
@@ -158,6 +186,7 @@ class Contents(NamedTuple):
 
     heard: set[type]
     simulated: bool
+    rover: bool
     horizon_ms: float
     places: list[BeaconPlace]
     ranges: list[float]
@@ -169,11 +198,14 @@ def _contents_of(configuration: Configuration, logs: tuple[Path, ...]) -> Conten
     latencies: list[int] = []
     places: dict[int, BeaconPlace] = {}
     ranges: list[float] = []
+    rover = False
     for sample in merged(readers):
         reading = sample.reading
         kind = type(reading)
         heard.add(kind)
-        if isinstance(reading, BeaconPlace):
+        if isinstance(reading, Presence):
+            rover |= reading.type in _ROVERS
+        elif isinstance(reading, BeaconPlace):
             places.setdefault(reading.beacon, reading)
         elif isinstance(reading, Range):
             ranges.append(reading.distance)
@@ -181,7 +213,7 @@ def _contents_of(configuration: Configuration, logs: tuple[Path, ...]) -> Conten
             latencies.append(sample.received - sample.time)
     simulated = any("SIM_STATE" in reader.kinds() for reader in readers)
     horizon_ms = _horizon_for(latencies, SITL_GNSS_DELAY_MS if simulated else 0.0)
-    return Contents(heard, simulated, horizon_ms, list(places.values()), ranges)
+    return Contents(heard, simulated, rover, horizon_ms, list(places.values()), ranges)
 
 
 def _horizon_for(latencies: list[int], delay_ms: float) -> float:
@@ -208,7 +240,17 @@ def _sensors_of(contents: Contents) -> tuple[Sensor, ...]:
     sensors: list[Sensor] = []
     for kind, readings in _KINDS:
         if contents.heard.intersection(readings):
-            delay = SITL_GNSS_DELAY_MS if contents.simulated and kind in ("position", "velocity") else 0.0
-            estimate = ("scale",) if kind == "range" else ()
-            sensors.append(Sensor.model_validate({"kind": kind, "delay_ms": delay, "estimate": estimate}))
+            sensors.append(Sensor.model_validate({"kind": kind} | _facts_of(kind, contents)))
     return tuple(sensors)
+
+
+def _facts_of(kind: str, contents: Contents) -> dict[str, Any]:
+    """Return what is filled in for a sensor beside its kind."""
+    if kind == "range":
+        return {"estimate": ("scale",)}
+    if kind in ("position", "velocity"):
+        if contents.simulated:
+            return {"delay_ms": SITL_GNSS_DELAY_MS, "correlation_s": 0.0}
+        if contents.heard & _ODOMETRY:
+            return {"estimate": ("delay",)}
+    return {}
