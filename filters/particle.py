@@ -23,6 +23,7 @@ from filters.kernels import random, resampling, weights
 from filters.kernels.compile import Float32Array, Int32Array
 from filters.kernels.covariance import covariance
 from filters.kernels.regularization import shrink
+from filters.motion.learned import Learned, SlowState
 from filters.motion.model import Motion
 from filters.motion.slow import RandomWalk, diffuse
 from filters.motion.walks import Walk, Walks
@@ -31,7 +32,7 @@ from filters.particle_moments import MomentSums
 from filters.particle_set import ParticleSet
 from filters.regularization import Rule, root, weighted_covariance
 from filters.resampling import Resampler, systematic
-from filters.sensing.model import Sensor
+from filters.sensing.model import Learner, Sensor
 
 Control = TypeVar("Control")
 M = TypeVar("M", bound=tuple[float | None, ...])
@@ -67,8 +68,8 @@ class ParticleFilter(Generic[Control]):
         The largest number of particles there can ever be.
     seed : int
         Of the random numbers.
-    slow : sequence of RandomWalk
-        Slow states beside those of the motion model, such as a sensor's bias.
+    slow : sequence of RandomWalk or Learned
+        Slow states beside those of the motion model, such as a sensor's bias: sampled, or marginalised by the sensor.
     block : int
         Most particles that are moved at once; noise for a block should fit the second-level cache.
     crew : Crew, optional
@@ -87,7 +88,7 @@ class ParticleFilter(Generic[Control]):
         *,
         capacity: int,
         seed: int,
-        slow: Sequence[RandomWalk] = (),
+        slow: Sequence[SlowState] = (),
         block: int = 16384,
         crew: Crew | None = None,
     ) -> None:
@@ -116,7 +117,9 @@ class ParticleFilter(Generic[Control]):
             for _ in range(self._blocks.threads)
         ]
         self._no_noise: Float32Array = np.zeros((rows, 1), np.float32)
-        self._walks = Walks((*motion.walks, *slow), self._particles, seed, pairs)
+        self._learned = [state for state in slow if isinstance(state, Learned)]
+        sampled = [state for state in slow if isinstance(state, RandomWalk)]
+        self._walks = Walks((*motion.walks, *sampled), self._particles, seed, pairs)
         self._keys = [(random.key(seed, stream), 2 * stream) for stream in range(pairs)]
         self._sample: Float32Array = np.zeros(min(EVIDENCE_SAMPLE, capacity), np.float32)
         self._sampled = 0
@@ -193,6 +196,7 @@ class ParticleFilter(Generic[Control]):
         self._particles.columns[2, :count] = np.remainder(heading + math.pi, 2.0 * math.pi) - math.pi
         self._centre.columns[2, 0] = math.atan2(np.sin(heading).mean(), np.cos(heading).mean())
         self._motion.start()
+        self._particles.variances.update({state.name: state.sigma**2 for state in self._learned})
         self._recount(count)
         self._level()
 
@@ -219,6 +223,8 @@ class ParticleFilter(Generic[Control]):
         self._step += 1
         step = self._step & 0xFFFFFFFF
         due = self._walks.due(duration)
+        for state in self._learned:
+            self._particles.variances[state.name] += state.walk * state.walk * duration
         if self._blocks.shared:
             self._blocks.share(lambda part, first, last: self._move(part, first, last, step, move, due))
         else:
@@ -260,7 +266,10 @@ class ParticleFilter(Generic[Control]):
         after = weights.log_sum.direct(particles.log_weights, self._sampled, self._stride, self._sample)
         self._log_sum = after
         self._weighed = True
-        return Evidence(constant + after - before if after > -math.inf else after, innovation, True)
+        log_mean = constant + after - before if after > -math.inf else after
+        if self._learned and isinstance(sensor, Learner):
+            sensor.learn(particles, measurement, log_mean)
+        return Evidence(log_mean, innovation, True)
 
     def _share_weighing(self, sensor: Sensor[M], measurement: M) -> float:
         constants = [0.0] * self._blocks.threads
@@ -317,7 +326,7 @@ class ParticleFilter(Generic[Control]):
         """
         self._settle()
         shift = STILL if displacement is None else displacement
-        given_path = self._motion.conditional_variances
+        given_path = self._given_path()
         moments = self._moment_sums.moments(shift, self._blocks, given_path, self.effective_sample_size)
         self._centre_values.clear()
         return moments
@@ -338,7 +347,7 @@ class ParticleFilter(Generic[Control]):
         found = Joint(tuple(names), np.zeros(rows.size), np.zeros((rows.size, rows.size)))
         columns, weights = self._particles.columns, self._weights
         covariance.direct(columns, weights, self.count, rows, reference, found.mean, found.covariance)
-        given_path = self._motion.conditional_variances
+        given_path = self._given_path()
         for place, name in enumerate(names):
             found.covariance[place, place] += given_path.get(name, 0.0)
         return found
@@ -489,7 +498,7 @@ class ParticleFilter(Generic[Control]):
         KeyError
             There is no dimension of that name.
         """
-        check_slow(names, self._motion.conditional_variances)
+        check_slow(names, self._given_path())
         rows = [self._particles.row(name) for name in names]
         mean, covariance = weighted_covariance(self._particles.columns[rows, : self.count], self.weights)
         factor, bandwidth = rule.kernel(self.effective_sample_size, len(rows))
@@ -533,6 +542,11 @@ class ParticleFilter(Generic[Control]):
             shift = STILL if displacement is None else displacement
             weights.displace(self._particles.columns, self._weights, self.count, scale, *shift, out[:rows])
         return out[:rows]
+
+    def _given_path(self) -> Mapping[str, float]:
+        """Variance, given a particle's path, of each marginalised column."""
+        variances = self._motion.conditional_variances
+        return {**variances, **self._particles.variances} if self._learned else variances
 
     def _settle(self) -> None:
         if self._weighed:

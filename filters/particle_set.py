@@ -24,9 +24,11 @@ class ParticleSet:
         Logarithm of each weight, up to a common constant.
     count : int
         How many particles there are.
+    variances : dict[str, float]
+        Variance, given a particle's path, of each slow state that a sensor marginalises; the same for all particles.
     """
 
-    __slots__ = ("capacity", "columns", "count", "log_weights", "names", "rows")
+    __slots__ = ("capacity", "columns", "count", "log_weights", "names", "rows", "variances")
 
     def __init__(self, names: tuple[str, ...], capacity: int) -> None:
         self.names: Final = names
@@ -35,6 +37,7 @@ class ParticleSet:
         self.columns: Float32Array = np.zeros((len(names), capacity), np.float32)
         self.log_weights: Float32Array = np.zeros(capacity, np.float32)
         self.count = 0
+        self.variances: dict[str, float] = {}
 
     def row(self, name: str) -> int:
         """Row of a dimension.

@@ -14,17 +14,19 @@ import subprocess
 import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import Progress
 
+from service.checks import judge, read_events
+from service.config import Configuration, Honesty
 from service.replay.command import PARTICLES
 from service.replay.run import Plan, Run, replay
 from service.replay.seeds import summary
 from service.replay.site import setting_of
-from service.replay.table import show
+from service.replay.table import show, show_checks
 from service.score import read_truth
 
 SIMULATOR = (sys.executable, "-m", "sim_vehicle")
@@ -34,7 +36,39 @@ class ScenarioError(Exception):
     """The simulator could not do its part; the text holds what it said."""
 
 
-def simulate(name: str, seed: int, stem: Path) -> None:
+@dataclass(frozen=True)
+class Play:
+    """How a scenario is played.
+
+    Attributes
+    ----------
+    seconds : float or None
+        How long; ``None``: as long as the scenario says.
+    without : tuple[str, ...]
+        Switches of ``[honesty]`` that are turned off.
+    """
+
+    seconds: float | None = None
+    without: tuple[str, ...] = ()
+
+    def configured(self, configuration: Configuration) -> Configuration:
+        """Return ``configuration`` with the switches turned off."""
+        switches = dict.fromkeys(self.without, False)
+        return configuration.model_copy(update={"honesty": configuration.honesty.model_copy(update=switches)})
+
+
+AS_IT_IS = Play()
+
+
+def unknown_switches(without: tuple[str, ...]) -> str:
+    """Return what is wrong with the names of switches, in the user's words; nothing if they are all known."""
+    wrong = [name for name in without if name not in Honesty.model_fields]
+    if not wrong:
+        return ""
+    return f"--without {', '.join(wrong)}: [honesty] has {', '.join(Honesty.model_fields)}"
+
+
+def simulate(name: str, seed: int, stem: Path, seconds: float | None = None) -> None:
     """Write the recording, truth and configuration of one simulated drive to ``stem`` with their endings.
 
     Raises
@@ -42,8 +76,9 @@ def simulate(name: str, seed: int, stem: Path) -> None:
     ScenarioError
         There is no such scenario, or the simulator failed.
     """
+    length = () if seconds is None else ("--seconds", str(seconds))
     done = subprocess.run(
-        [*SIMULATOR, name, "--seed", str(seed), "--write", str(stem)],
+        [*SIMULATOR, name, "--seed", str(seed), "--write", str(stem), *length],
         capture_output=True,
         text=True,
         check=False,
@@ -54,11 +89,11 @@ def simulate(name: str, seed: int, stem: Path) -> None:
         )
 
 
-def run_once(name: str, seed: int) -> Run:
-    """Simulate ``name`` with ``seed`` and replay what it sent."""
+def run_once(name: str, seed: int, play: Play = AS_IT_IS) -> Run:
+    """Simulate ``name`` with ``seed``, replay what it sent, and ask of the run what the scenario asks."""
     with tempfile.TemporaryDirectory(prefix="beliefd-scenario-") as folder:
         stem = Path(folder) / name
-        simulate(name, seed, stem)
+        simulate(name, seed, stem, play.seconds)
         logs = tuple(
             path
             for ending in (".tlog", ".candump.log")
@@ -66,14 +101,18 @@ def run_once(name: str, seed: int) -> Run:
         )
         setting = setting_of(logs, stem.with_name(name + ".toml"), stem.with_name(name + "_truth.csv"))
         truth = read_truth(setting.truth) if setting.truth else None
-        run = replay(Plan(logs, setting.configuration, PARTICLES, truth), seed)
+        run = replay(Plan(logs, play.configured(setting.configuration), PARTICLES, truth), seed)
+        if run.story is not None and truth is not None:
+            table = stem.with_name(name + "_events.csv")
+            story = run.story.beside(truth, read_events(table) if table.is_file() else ())
+            run = replace(run, checks=judge(name, story))
         return replace(run, seed=seed)
 
 
-def run_seeds(name: str, seeds: int, console: Console) -> list[Run]:
+def run_seeds(name: str, seeds: int, console: Console, play: Play = AS_IT_IS) -> list[Run]:
     """Run ``name`` for the seeds 0 … ``seeds`` - 1 in a pool of processes, with a progress bar."""
     if seeds == 1:
-        return [run_once(name, 0)]
+        return [run_once(name, 0, play)]
     context = multiprocessing.get_context("spawn")
     workers = min(seeds, os.cpu_count() or 1)
     with (
@@ -81,7 +120,7 @@ def run_seeds(name: str, seeds: int, console: Console) -> list[Run]:
         ProcessPoolExecutor(workers, context) as pool,
     ):
         task = progress.add_task(name, total=seeds)
-        futures = {pool.submit(run_once, name, seed): seed for seed in range(seeds)}
+        futures = {pool.submit(run_once, name, seed, play): seed for seed in range(seeds)}
         runs: list[Run] = []
         for future in as_completed(futures):
             runs.append(future.result())
@@ -96,13 +135,16 @@ def list_scenarios(console: Console) -> int:
     return 0 if listed.stdout.strip() else 1
 
 
-def command(name: str | None, seeds: int, as_json: bool) -> int:
+def command(name: str | None, seeds: int, as_json: bool, play: Play = AS_IT_IS) -> int:
     """Run ``beliefd scenario`` and return its exit status."""
     console = Console(stderr=as_json)
     if name is None:
         return list_scenarios(Console())
+    if wrong := unknown_switches(play.without):
+        console.print(wrong, highlight=False, markup=False, style="red")
+        return 2
     try:
-        runs = run_seeds(name, seeds, console)
+        runs = run_seeds(name, seeds, console, play)
     except ScenarioError as error:
         console.print(str(error), highlight=False, markup=False, style="red")
         return 2 if "no scenario" in str(error).lower() else 1
@@ -110,4 +152,5 @@ def command(name: str | None, seeds: int, as_json: bool) -> int:
         print(json.dumps({"runs": [run.row() for run in runs], "summary": summary(runs)}))  # noqa: T201
     else:
         show(runs, console, f"scenario {name}")
+        show_checks(runs, console)
     return 0

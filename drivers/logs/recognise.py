@@ -14,6 +14,7 @@ from drivers.logs.canlog import GZIP
 from drivers.logs.ulog.reader import MAGIC as ULOG
 
 HEAD = 4096
+MCAP = b"\x89MCAP0\r\n"
 
 
 class Format(Enum):
@@ -27,6 +28,7 @@ class Format(Enum):
     ASC = "Vector .asc log"
     BLF = "Vector .blf log"
     TRC = "PEAK .trc log"
+    RECORDING = "recording of samples"
 
 
 ENDINGS: dict[str, Format] = {
@@ -38,6 +40,7 @@ ENDINGS: dict[str, Format] = {
     ".asc": Format.ASC,
     ".blf": Format.BLF,
     ".trc": Format.TRC,
+    ".mcap": Format.RECORDING,
 }
 """By the name's ending, without ``.gz``."""
 
@@ -59,6 +62,7 @@ def _is_candump(head: bytes) -> bool:
 
 _SIGNS: tuple[tuple[Format, Callable[[bytes], bool]], ...] = (
     (Format.ULOG, lambda head: head.startswith(ULOG)),
+    (Format.RECORDING, lambda head: head.startswith(MCAP)),
     (Format.DATAFLASH, lambda head: head.startswith(b"\xa3\x95\x80")),
     (Format.BLF, lambda head: head.startswith(blf.FILE_MAGIC)),
     (Format.DATAFLASH_TEXT, lambda head: head.startswith(b"FMT, ")),

@@ -5,6 +5,7 @@ run on the same samples with the same parameters. What they leave out is the out
 """
 
 from filters.linearised.bearing import LinearisedBearing
+from filters.linearised.biased_range import LinearisedBiasedRange
 from filters.linearised.constant_velocity import LinearisedConstantVelocity
 from filters.linearised.down import LinearisedDown
 from filters.linearised.heading import LinearisedHeading
@@ -16,6 +17,7 @@ from filters.linearised.velocity import LinearisedVelocity
 
 __all__ = [
     "LinearisedBearing",
+    "LinearisedBiasedRange",
     "LinearisedConstantVelocity",
     "LinearisedDown",
     "LinearisedHeading",

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from filters import chi_square
 from filters.kalman import Matrix, checked_gaussian
 from filters.kernels.bank import correct, move
-from filters.motion.slow import RandomWalk
+from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.sensing import (
     Heading,
@@ -79,7 +79,7 @@ class GaussianBank:
     ----------
     motion : Unicycle
         Its noises and walks are used; what it has learned is not.
-    slow : sequence of RandomWalk
+    slow : sequence of RandomWalk or Learned
         Further states that only wander.
     members : int
         How many there are room for; none is live at first.
@@ -99,7 +99,7 @@ class GaussianBank:
         Fewer than one member.
     """
 
-    def __init__(self, motion: Unicycle, slow: Sequence[RandomWalk] = (), members: int = 1) -> None:
+    def __init__(self, motion: Unicycle, slow: Sequence[SlowState] = (), members: int = 1) -> None:
         if members < 1:
             raise ValueError(f"bank: at least one member, got {members}")
         self._motion = motion

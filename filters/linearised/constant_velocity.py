@@ -13,7 +13,7 @@ import numpy as np
 from filters.extended_kalman import Transition
 from filters.kalman import Matrix
 from filters.motion.constant_velocity import ConstantVelocity, FreeControl, acceleration_covariance
-from filters.motion.slow import RandomWalk
+from filters.motion.learned import SlowState
 
 _AXES = (("north", "velocity_north"), ("east", "velocity_east"), ("down", "velocity_down"))
 
@@ -25,13 +25,13 @@ class LinearisedConstantVelocity:
     ----------
     motion : ConstantVelocity
         Its densities are used; what it has learned is not.
-    slow : sequence of RandomWalk
+    slow : sequence of RandomWalk or Learned
         Further states that only wander, such as a range's bias.
     """
 
     angles = (2,)
 
-    def __init__(self, motion: ConstantVelocity, slow: Sequence[RandomWalk] = ()) -> None:
+    def __init__(self, motion: ConstantVelocity, slow: Sequence[SlowState] = ()) -> None:
         self.names = (*motion.names, *(walk.name for walk in slow))
         axes = _AXES[: motion.dimensions]
         densities = [motion.acceleration_noise, motion.acceleration_noise, motion.vertical_noise]

@@ -18,6 +18,7 @@ from filters.belief import STILL, Displacement, Evidence, Joint, Moments
 from filters.extended_kalman import ExtendedKalmanFilter, LinearisedMotion, LinearisedSensor
 from filters.kalman import Matrix, symmetric
 from filters.linearised.bearing import LinearisedBearing
+from filters.linearised.biased_range import LinearisedBiasedRange
 from filters.linearised.constant_velocity import LinearisedConstantVelocity
 from filters.linearised.down import LinearisedDown
 from filters.linearised.heading import LinearisedHeading
@@ -27,15 +28,17 @@ from filters.linearised.range_bearing import LinearisedRangeBearing
 from filters.linearised.unicycle import LinearisedUnicycle
 from filters.linearised.velocity import LinearisedVelocity
 from filters.motion.constant_velocity import ConstantVelocity
+from filters.motion.learned import SlowState
 from filters.motion.model import Motion
-from filters.motion.slow import RandomWalk
 from filters.motion.unicycle import Unicycle
 from filters.sensing import Bearing, Heading, Position, Range, RangeBearing, Sensor, Velocity
+from filters.sensing.biased_range import BiasedRange
 from filters.sensing.down import Down
 
 LINEARISED: Mapping[type, Callable[[Any], LinearisedSensor[Any]]] = MappingProxyType(
     {
         Bearing: LinearisedBearing,
+        BiasedRange: LinearisedBiasedRange,
         Down: LinearisedDown,
         Heading: LinearisedHeading,
         Position: LinearisedPosition,
@@ -46,7 +49,7 @@ LINEARISED: Mapping[type, Callable[[Any], LinearisedSensor[Any]]] = MappingProxy
 )
 """Which linearised model stands for which sensor model."""
 
-MOTIONS: Mapping[type, Callable[[Any, Sequence[RandomWalk]], LinearisedMotion[Any]]] = MappingProxyType(
+MOTIONS: Mapping[type, Callable[[Any, Sequence[SlowState]], LinearisedMotion[Any]]] = MappingProxyType(
     {Unicycle: LinearisedUnicycle, ConstantVelocity: LinearisedConstantVelocity}
 )
 """Which linearised model stands for which motion model."""
@@ -62,7 +65,7 @@ class ShadowFilter:
     motion : Motion
         The particle filter's, one of :data:`MOTIONS`: its noises and walks are used, and what it
         has learned is not touched.
-    slow : sequence of RandomWalk
+    slow : sequence of RandomWalk or Learned
         Further states that only wander, as the particle filter has them.
     gate : float
         Probability with which a measurement that the model is right about passes.
@@ -78,9 +81,7 @@ class ShadowFilter:
         A gate outside (0, 1), or a motion model that has no linearised counterpart.
     """
 
-    def __init__(
-        self, motion: Motion[Any, Any], slow: Sequence[RandomWalk] = (), gate: float = 0.999
-    ) -> None:
+    def __init__(self, motion: Motion[Any, Any], slow: Sequence[SlowState] = (), gate: float = 0.999) -> None:
         if not 0.0 < gate < 1.0:
             raise ValueError(f"shadow filter: gate is a probability in (0, 1), got {gate}")
         make = MOTIONS.get(type(motion))

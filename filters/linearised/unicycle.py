@@ -22,7 +22,7 @@ import numpy as np
 
 from filters.extended_kalman import Transition
 from filters.kalman import Matrix
-from filters.motion.slow import RandomWalk
+from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 
 
@@ -33,13 +33,13 @@ class LinearisedUnicycle:
     ----------
     motion : Unicycle
         Its noises and walks are used; what it has learned is not.
-    slow : sequence of RandomWalk
+    slow : sequence of RandomWalk or Learned
         Further states that only wander, such as a range scale.
     """
 
     angles = (2,)
 
-    def __init__(self, motion: Unicycle, slow: Sequence[RandomWalk] = ()) -> None:
+    def __init__(self, motion: Unicycle, slow: Sequence[SlowState] = ()) -> None:
         self._motion = motion
         self.names = (*motion.names, *(walk.name for walk in slow))
         walks = [0.0, 0.0, 0.0, motion.gyro_bias_walk, motion.odometry_scale_walk, *(s.walk for s in slow)]

@@ -29,9 +29,10 @@ VELOCITY_EAST = "velocity_east"
 VELOCITY_DOWN = "velocity_down"
 DOWN = "down"
 
+_PLANE, _SPACE = 2, 3
 _COLUMNS = {
-    2: ("north", "east", "heading", VELOCITY_NORTH, VELOCITY_EAST),
-    3: ("north", "east", "heading", VELOCITY_NORTH, VELOCITY_EAST, DOWN, VELOCITY_DOWN),
+    _PLANE: ("north", "east", "heading", VELOCITY_NORTH, VELOCITY_EAST),
+    _SPACE: ("north", "east", "heading", VELOCITY_NORTH, VELOCITY_EAST, DOWN, VELOCITY_DOWN),
 }
 
 
@@ -166,7 +167,7 @@ class ConstantVelocity:
         """Variances of the velocities given a particle's path; the spread of the particles' means comes on top."""
         horizontal = self._horizontal.variance
         variances = {VELOCITY_NORTH: horizontal, VELOCITY_EAST: horizontal}
-        if self.dimensions == len(_COLUMNS):
+        if self.dimensions == _SPACE:
             variances[VELOCITY_DOWN] = self._vertical.variance
         return variances
 
@@ -184,7 +185,7 @@ class ConstantVelocity:
         duration, sigma, gain, vertical_sigma, vertical_gain = step
         glide.direct(columns, 0, 3, noise, 0, first, last, duration, sigma, gain)
         glide.direct(columns, 1, 4, noise, 1, first, last, duration, sigma, gain)
-        if self.dimensions == len(_COLUMNS):
+        if self.dimensions == _SPACE:
             glide.direct(columns, 5, 6, noise, 2, first, last, duration, vertical_sigma, vertical_gain)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 from filters.particle_set import ParticleSet
 
@@ -39,4 +39,17 @@ class Sensor(Protocol[Measurement]):
 
     def innovation(self, centre: Mapping[str, float], measurement: Measurement) -> float:
         """Measured minus expected at the belief's centre, given by the names of its dimensions."""
+        ...
+
+
+@runtime_checkable
+class Learner(Protocol[Measurement]):
+    """What a sensor model offers beside that if it marginalises a slow state (:class:`filters.motion.learned.Learned`).
+
+    While it weighs a particle it corrects that particle's mean, which is the particle's own; the variance is common to
+    all, so it is told once, when all have been weighed.
+    """
+
+    def learn(self, particles: ParticleSet, measurement: Measurement, log_mean: float) -> None:
+        """Correct ``particles.variances`` by a measurement whose log evidence was ``log_mean``."""
         ...

@@ -15,6 +15,8 @@ EPILOG = """
 beliefd scenario [dim]· lists them[/dim]
 
 beliefd scenario beacons --seeds 20
+
+beliefd scenario spoof --seeds 5 --without trust
 """
 
 
@@ -23,6 +25,19 @@ def command(
     seeds: Annotated[
         int, typer.Option(help="How many runs, each with its own vehicle and noise.", min=1)
     ] = 1,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            help="How long each drive is.  [default: the scenario's own]", min=1.0, show_default=False
+        ),
+    ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A switch of [honesty] to turn off (hypotheses, recovery, trust, motion_mode); may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as one JSON object.")] = False,
 ) -> None:
     """Simulate a scenario to message bytes, replay them, and measure the error against the truth."""
@@ -31,4 +46,4 @@ def command(
     kernels.prepare()
     from service import scenario
 
-    leave(scenario.command(name, seeds, as_json))
+    leave(scenario.command(name, seeds, as_json, scenario.Play(seconds, tuple(without or ()))))

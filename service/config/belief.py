@@ -188,6 +188,12 @@ class Sensor(Section):
     Default: 1 for position, velocity and heading, 0 (every reading counts for itself) for all others."""
     bias_sigma: NotNegative = 0.2
     """What an estimated bias may be at the start, in the reading's unit (one standard deviation)."""
+    bias_walk: NotNegative = 0.003
+    """Random walk of an estimated bias of ranges, m per √s; every beacon has its own."""
+    nlos: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=0.9)] = 0.0
+    """Of ranges: share of readings that are too long, because something stands in the way."""
+    nlos_length: Positive = 1.0
+    """By how much those are too long on average, metres."""
     declination_deg: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-180, le=180)] = 0.0
     """For a magnetic heading: degrees that magnetic north lies east of true north."""
     sigma_bearing: Positive | None = None

@@ -22,6 +22,7 @@ from filters.motion.constant_velocity import (
     FreeControl,
     carried,
 )
+from filters.motion.learned import SlowState
 from filters.motion.slow import RandomWalk
 from filters.particle import ParticleFilter
 from filters.sensing.down import Down, DownMeasurement
@@ -29,7 +30,7 @@ from service.config import Configuration
 from service.estimate import Triangle, Triple
 from service.estimator.carrier import Carrier, Pose
 from service.estimator.controls import Controls, controls_of
-from service.estimator.height import CLIMB, Height, down_of
+from service.estimator.height import CLIMB, Height, down_of, height_state
 from service.estimator.start import Anchor, sensor_states
 from service.estimator.track import SECOND
 from service.geodesy import LocalFrame
@@ -55,12 +56,10 @@ class FreeVehicle:
             settings.vertical_sigma,
         )
         self.controls: Controls = controls_of(settings)
-        self.slow_states: list[RandomWalk] = sensor_states(configuration)
-        fixes = any(sensor.kind == "position" for sensor in configuration.sensor)
-        self._height = Height() if fixes and settings.dimensions == 2 else None
+        self.slow_states: list[SlowState] = sensor_states(configuration)
+        self._height = Height() if height_state(configuration) is None else None
         if self._height is None and settings.dimensions == 2:
             self.slow_states.append(RandomWalk(DOWN, CLIMB))
-        self.height_names = () if self._height is not None else (DOWN,)
 
     def predict(self, belief: ParticleFilter[FreeControl], start: int, end: int) -> None:
         """Move the particles from ``start`` to ``end`` (nanoseconds)."""
@@ -162,8 +161,8 @@ class FreeCarrier:
     ) -> tuple[float, float, float, float] | None:
         if self._axes > 2:
             return float(mean[2]), float(covariance[2, 2]), float(covariance[0, 2]), float(covariance[1, 2])
-        if not self._vehicle.height_names:
-            height = self._vehicle.height
+        height = self._vehicle.height
+        if DOWN not in moments.names:
             return None if height is None else (*height, 0.0, 0.0)
         joint = self._belief.joint(("north", "east", DOWN))
         nd, ed, dd = joint.covariance[2]

@@ -7,8 +7,8 @@ import math
 from drivers.sample import AnyReading
 from filters.belief import Belief, Displacement, Moments
 from filters.density.gaussian import radius
+from filters.motion.learned import SlowState
 from filters.motion.prediction import IntervalNoise, process_covariance, velocity_moments
-from filters.motion.slow import RandomWalk
 from filters.motion.unicycle import GYRO_BIAS, ODOMETRY_SCALE, Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from service.config import Configuration
@@ -53,7 +53,7 @@ class GroundVehicle:
             odometry_scale_sigma=settings.odometry_scale_sigma,
         )
         self.controls: Controls = controls_of(settings)
-        self.slow_states: list[RandomWalk] = sensor_states(configuration)
+        self.slow_states: list[SlowState] = sensor_states(configuration)
         self._height = Height()
 
     def predict(self, belief: ParticleFilter[UnicycleControl], start: int, end: int) -> None:

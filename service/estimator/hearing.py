@@ -23,6 +23,7 @@ from filters.sensing import (
     Range,
     RangeMeasurement,
 )
+from filters.sensing.biased_range import BiasedRange, BiasedRangeMeasurement
 from service.estimator.measuring import Measurement
 from service.estimator.way import Shape
 
@@ -92,8 +93,11 @@ def widened(measured: Measurement, variance: float, turn_variance: float) -> Any
     return measured.value if widen is None else widen(measured, variance, turn_variance)
 
 
-def _range(measured: Measurement, variance: float, _turn: float) -> RangeMeasurement:
-    model, value = cast(Range, measured.model), cast(RangeMeasurement, measured.value)
+def _range(
+    measured: Measurement, variance: float, _turn: float
+) -> RangeMeasurement | BiasedRangeMeasurement:
+    model = cast(Range | BiasedRange, measured.model)
+    value = cast(RangeMeasurement | BiasedRangeMeasurement, measured.value)
     sigma = model.sigma if value.sigma is None else value.sigma
     return value._replace(sigma=math.sqrt(sigma * sigma + variance))
 
@@ -115,6 +119,7 @@ def _heading(measured: Measurement, _variance: float, turn: float) -> HeadingMea
 
 _WIDEN: dict[type, Callable[[Measurement, float, float], Any]] = {
     RangeMeasurement: _range,
+    BiasedRangeMeasurement: _range,
     PositionMeasurement: _position,
     HeadingMeasurement: _heading,
 }

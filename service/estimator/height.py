@@ -9,11 +9,24 @@ import numpy as np
 
 from drivers.sample import AnyReading, GeodeticPosition, LocalPosition
 from filters.kalman import KalmanFilter
+from filters.motion.constant_velocity import DOWN
+from service.config import Configuration
 from service.estimator.start import Anchor
 from service.geodesy import LocalFrame
 
 CLIMB = 0.05
 """m per √s; how fast the height wanders, uncorrected."""
+
+
+def height_state(configuration: Configuration) -> str | None:
+    """Return the name of the state that is the vehicle's down, or ``None`` where a filter of its own keeps it.
+
+    A tag's particles have it: in three dimensions, and on the plane unless position fixes bring altitudes.
+    """
+    if configuration.vehicle.motion != "constant_velocity":
+        return None
+    fixes = any(sensor.kind == "position" for sensor in configuration.sensor)
+    return None if fixes and configuration.motion.dimensions == 2 else DOWN
 
 
 class Height:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from filters.motion.learned import Learned, SlowState
 from filters.motion.slow import RandomWalk
-from service.config import Configuration
+from service.config import Configuration, Sensor
 
 Columns = dict[str, NDArray[np.float32]]
 
@@ -30,8 +32,13 @@ DELAY = "gnss_delay"
 SENSOR_WALK = 1e-4
 """Per √s; how fast a sensor's scale or bias wanders."""
 
+<<<<<<< HEAD
 DELAY_WALK = 1e-3
 """s per √s; a receiver that is busy answers later."""
+=======
+POSE = 3
+"""Columns that every belief begins with."""
+>>>>>>> main
 
 ZERO = (0.0, 0.0)
 MARGINALISED = {
@@ -44,12 +51,40 @@ MARGINALISED = {
 """Mean and spread of the columns whose own spread at the start the motion model knows."""
 
 
+<<<<<<< HEAD
 def sensor_states(configuration: Configuration) -> list[RandomWalk]:
     """Return the slow states that the sensors ask for, each once."""
     return [
         RandomWalk(name, DELAY_WALK if name == DELAY else SENSOR_WALK)
         for name in _sensor_sigmas(configuration)
     ]
+=======
+def sensor_states(configuration: Configuration) -> list[SlowState]:
+    """Return the slow states that the sensors ask for, each once: ranges have one bias for each beacon."""
+    sampled = [RandomWalk(name, SENSOR_WALK) for name in _sensor_sigmas(configuration)]
+    learned = {
+        state.name: state for sensor in configuration.sensor for state in _biases(sensor, configuration)
+    }
+    return [*sampled, *learned.values()]
+
+
+def beacon_bias(beacon: int) -> str:
+    """Return the name of the bias of ranges to a beacon."""
+    return f"range_bias/{beacon}"
+
+
+def biased_beacons(sensor: Sensor, configured: Iterable[int]) -> list[int]:
+    """Return the beacons of ``configured`` whose ranges' biases ``sensor`` estimates."""
+    if sensor.kind != "range" or "bias" not in sensor.estimate:
+        return []
+    return [beacon for beacon in configured if sensor.beacons is None or beacon in sensor.beacons]
+
+
+def _biases(sensor: Sensor, configuration: Configuration) -> list[Learned]:
+    configured = [beacon.id for beacon in configuration.beacon]
+    beacons = biased_beacons(sensor, configured)
+    return [Learned(beacon_bias(beacon), sensor.bias_walk, sensor.bias_sigma) for beacon in beacons]
+>>>>>>> main
 
 
 def _sensor_sigmas(configuration: Configuration) -> dict[str, tuple[float, float]]:
@@ -58,7 +93,7 @@ def _sensor_sigmas(configuration: Configuration) -> dict[str, tuple[float, float
     for sensor in configuration.sensor:
         if "scale" in sensor.estimate:
             sigmas.setdefault(f"{sensor.kind}_scale", (1.0, sensor.scale_sigma))
-        if "bias" in sensor.estimate:
+        if "bias" in sensor.estimate and sensor.kind != "range":
             sigmas.setdefault(f"{sensor.kind}_bias", (0.0, sensor.bias_sigma))
         if "delay" in sensor.estimate:
             sigmas.setdefault(DELAY, (0.0, sensor.delay_sigma))
@@ -85,9 +120,8 @@ def draw(
     columns["north"], columns["east"] = _places(configuration, count, random, anchor)
     columns["heading"] = _headings(configuration, count, random)
     sigmas = MARGINALISED | _sensor_sigmas(configuration) | {"down": _down(anchor)}
-    for name, (mean, sigma) in sigmas.items():
-        if name not in names:
-            continue
+    for name in names[POSE:]:
+        mean, sigma = sigmas.get(name, ZERO)  # a bias that a sensor learns begins at zero
         columns[name] = (mean + sigma * random.standard_normal(count)).astype(np.float32)
     return {name: columns[name] for name in names}
 

@@ -10,8 +10,8 @@ from typing import Any, Protocol
 
 from drivers.sample import AnyReading
 from filters.belief import Belief, Moments
+from filters.motion.learned import SlowState
 from filters.motion.model import Motion
-from filters.motion.slow import RandomWalk
 from filters.particle import ParticleFilter
 from service.config import Configuration
 from service.estimator.carrier import Carrier
@@ -25,7 +25,7 @@ from service.geodesy import LocalFrame
 class Vehicle(Protocol):
     """What the estimator wants of a vehicle. Times are nanoseconds on its clock."""
 
-    slow_states: list[RandomWalk]
+    slow_states: list[SlowState]
     """Slow states beside those of the motion: what the sensors ask for."""
 
     @property

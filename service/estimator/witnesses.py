@@ -10,6 +10,7 @@ belief may be wrong already.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from filters.kalman import Matrix
 from filters.linearised.bank import BATCHED, GaussianBank
-from filters.motion.slow import RandomWalk
+from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle
 from filters.particle import ParticleFilter
 from service.estimator.measuring import Measurement
@@ -67,13 +68,13 @@ class Witnesses:
     ----------
     motion : Unicycle
         How the vehicle moves.
-    slow : list[RandomWalk]
+    slow : sequence of RandomWalk or Learned
         Slow states beside it.
     groups : int
         For how many groups there is room.
     """
 
-    def __init__(self, motion: Unicycle, slow: list[RandomWalk], groups: int) -> None:
+    def __init__(self, motion: Unicycle, slow: Sequence[SlowState], groups: int) -> None:
         self.bank = GaussianBank(motion, slow, SLOTS * groups)
         self._began = np.zeros(SLOTS * groups, np.int64)
         self._contradiction: Matrix = np.zeros(SLOTS * groups)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 
@@ -17,6 +17,7 @@ import msgspec
 
 from drivers.logs import LogReader
 from drivers.sample import LinkReport, Sample
+from service.checks import Check, Story, Teller
 from service.config import Configuration
 from service.decisions import Decided
 from service.estimator import Course, Estimator
@@ -26,7 +27,7 @@ from service.replay.rows import EstimateFile
 from service.replay.sources import LogError, merged, open_log
 from service.replay.tally import ShadowRun, ShadowTally, Tally
 from service.replay.trace import Trace, Tracer
-from service.score import Score, Truth
+from service.score import UNSCORED, Score, Truth, figures, levels
 
 SECOND = 1_000_000_000
 SILENCE_LIMIT = 600 * SECOND
@@ -78,6 +79,12 @@ class Run:
         Samples that the plan took away.
     trace : Trace or None
         The run tick by tick, where the plan asked for it.
+    levels : list[int]
+        Ticks by the content of the smallest published region that holds the truth, in 100 equal bins of 0 … 1.
+    story : Story or None
+        What was published tick by tick, for whoever has questions to it.
+    checks : list[Check]
+        The questions that a scenario asks, with their answers.
     """
 
     seed: int
@@ -96,6 +103,9 @@ class Run:
     last_reason: str = ""
     blanked: int = 0
     trace: Trace | None = None
+    levels: list[int] = field(default_factory=list[int])
+    story: Story | None = None
+    checks: list[Check] = field(default_factory=list[Check])
 
     def row(self) -> dict[str, object]:
         """Return the figures as ``--json`` prints them."""
@@ -117,6 +127,9 @@ class Run:
             },
             "shadow": self.shadow.row(),
             "links": [msgspec.to_builtins(report) for report in self.links],
+            "levels": self.levels,
+            **({} if self.story is None else self.story.row()),
+            "checks": [check._asdict() for check in self.checks],
         }
 
 
@@ -179,7 +192,7 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
     first = next(samples, None)
     if first is None:
         raise LogError(nothing_in(readers, plan.logs))
-    tally = Tally()
+    tally, teller = Tally(), Teller()
     with ExitStack() as stack:
         file = None
         if plan.out is not None:
@@ -189,6 +202,9 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
             estimator.ingest(batch)
             estimate = estimator.tick(now, now, afforded, course)
             tally.add(estimate)
+            teller.add(estimate)
+            if teller.due(estimate.time):
+                teller.ask(estimate.time, estimator.sensors(now))
             beside.add(now, estimate.time)
             if tracer is not None:
                 tracer.add(estimate, shadow.at(now))
@@ -200,6 +216,7 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
     progress(1.0, tally.ticks / plan.configuration.loop.rate)
     run = _run(seed, plan, estimator, tally, beside, readers, seconds, now)
     run.blanked = seen.hidden
+    run.story = teller.story()
     run.trace = None if tracer is None else tracer.trace()
     return run
 
@@ -214,12 +231,13 @@ def _run(
     seconds: float,
     now: int,
 ) -> Run:
-    drops = estimator.drops
+    drops, compared = estimator.drops, tally.path.compared(plan.truth)
     late = drops.pop("late", 0)
     last = tally.last
     return Run(
         seed=seed,
-        score=tally.path.score(plan.truth),
+        score=UNSCORED if compared is None else figures(compared),
+        levels=[] if compared is None else levels(compared),
         particles_mean=tally.particles / max(1, tally.ticks),
         late_samples=late,
         dropped=sum(drops.values()),

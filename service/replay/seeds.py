@@ -9,6 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, wait
 from multiprocessing.queues import SimpleQueue
 
+from service.consistency import bounds
 from service.replay.run import Plan, Run, replay
 
 Report = Callable[[int, float, float], None]
@@ -54,14 +55,27 @@ def replay_seeds(plan: Plan, seeds: list[int], report: Report, processes: int | 
         return [future.result() for future in sorted(futures, key=lambda f: futures[f])]
 
 
-SCORES = ("rmse_m", "mean_m", "p95_m", "max_m", "coverage_95", "nees_mean", "final_m")
+SCORES = (
+    "rmse_m",
+    "mean_m",
+    "p95_m",
+    "max_m",
+    "coverage_95",
+    "nees_mean",
+    "final_m",
+    "coverage_50",
+    "coverage_99",
+    "log_score",
+)
 SUMMARISED = (*SCORES, "particles_mean", "real_time_factor")
 
 
 def summary(runs: list[Run]) -> dict[str, object]:
     """Return mean, standard deviation, least and greatest over the seeds of every figure, and the health shares.
 
-    ``shadow`` holds the same of the extended Kalman filter, and how many innovations its gate kept out.
+    ``shadow`` holds the same of the extended Kalman filter, and how many innovations its gate kept out; ``checks`` the
+    questions of a scenario, by name: passed by how many of how many, and the figures found; ``nees_bounds`` where the
+    mean NEES of a consistent filter lies with 95 %, given how many independent ticks all runs are worth.
     """
     spread: dict[str, object] = {"seeds": len(runs)}
     spread |= _spreads([run.row() for run in runs], SUMMARISED)
@@ -69,7 +83,22 @@ def summary(runs: list[Run]) -> dict[str, object]:
     spread["health"] = {s: round(statistics.fmean(run.health.get(s, 0.0) for run in runs), 4) for s in states}
     shadows = [run.shadow.row() | {"gated": sum(run.shadow.gated.values())} for run in runs]
     spread["shadow"] = _spreads(shadows, (*SCORES, "gated", "ticks"))
+    spread["checks"] = _answers(runs)
+    worth = [run.score.nees_samples for run in runs if run.score.nees_samples is not None]
+    spread["nees_bounds"] = [round(bound, 4) for bound in bounds(sum(worth))] if worth else None
     return spread
+
+
+def _answers(runs: list[Run]) -> dict[str, object]:
+    answers: dict[str, object] = {}
+    for index, check in enumerate(runs[0].checks):
+        given = [run.checks[index] for run in runs]
+        answers[check.name] = {
+            "passed": sum(one.passed for one in given),
+            "of": len(given),
+            "found": [one.found for one in given],
+        }
+    return answers
 
 
 def _spreads(rows: list[dict[str, object]], names: tuple[str, ...]) -> dict[str, object]:

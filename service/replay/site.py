@@ -15,17 +15,32 @@ from typing import Any, NamedTuple
 
 from drivers.sample import (
     BeaconPlace,
+    Bearing,
     GeodeticPosition,
     Heading,
     LocalPosition,
+    MotionCommand,
     MotorSpeed,
     Odometer,
     Presence,
     Range,
+    RangeBearing,
     Speed,
     Velocity,
 )
-from service.config import CanLink, Configuration, Link, MavlinkLink, Sensor, Site, Start, Vehicle, load, site
+from service.config import (
+    CanLink,
+    Configuration,
+    Link,
+    MavlinkLink,
+    Sensor,
+    Site,
+    Start,
+    Vehicle,
+    ZenohLink,
+    load,
+    site,
+)
 from service.replay.sources import kind_of, merged, open_log
 from service.replay.surroundings import area_about, beacons_of
 
@@ -33,7 +48,7 @@ SITL_GNSS_DELAY_MS = 90.0
 """ArduPilot's simulator reports a fix this long after it was true."""
 
 ROVER_GYRO_DELAY_MS = 56.0
-"""What a second-order Butterworth low pass delays: sqrt(2) / (2 pi f), at INS_GYRO_FILTER's 4 Hz for rovers and boats."""
+"""What a second-order Butterworth low pass delays: sqrt(2) / (2 pi f), at INS_GYRO_FILTER's 4 Hz for rovers."""
 
 _ROVERS = (10, 11)
 """MAV_TYPE of ground rovers and surface boats."""
@@ -47,7 +62,21 @@ _KINDS: tuple[tuple[str, tuple[type, ...]], ...] = (
     ("range", (Range,)),
     ("heading", (Heading,)),
 )
-_MEASURED = frozenset(reading for _, readings in _KINDS for reading in readings)
+_SIGHTS: tuple[tuple[str, tuple[type, ...]], ...] = (
+    ("range_bearing", (RangeBearing,)),
+    ("bearing", (Bearing,)),
+)
+"""Of use only where there is a map of landmarks."""
+_MEASURED = frozenset(reading for _, readings in (*_KINDS, *_SIGHTS) for reading in readings)
+
+_ODOMETRY = frozenset({Odometer, Speed, MotionCommand})
+"""What tells how far the vehicle went; without any of it a motion model with a heading has nothing to go by."""
+
+_POINTING = frozenset({"velocity", "heading"})
+"""Kinds that speak of a heading, which a tag has not."""
+
+RADIO_BIAS = 0.03
+"""Metres; what the antenna delay of a calibrated ultra-wideband radio leaves in its ranges."""
 
 PROMPT = 0.97
 """Share of the measurements that a filled-in horizon waits for."""
@@ -122,15 +151,18 @@ def _read(path: Path, logs: tuple[Path, ...], notes: list[str]) -> Configuration
 
 def _filled(partial: Site, logs: tuple[Path, ...], notes: list[str]) -> Configuration:
     """Fill in what ``partial`` leaves out, from the logs themselves."""
-    vehicle = Vehicle(name="replay")
-    links = _links_of(logs)
+    vehicle, links = Vehicle(name="replay"), _links_of(logs)
     bare = partial.configuration(vehicle, links, ())
     if not partial.link:
         notes.extend(f'link filled in: "{link.name}" ({link.kind})' for link in links)
     if partial.sensor:
         return bare
     contents = _contents_of(bare, logs)
-    sensors = _sensors_of(contents)
+    if partial.vehicle is None and not contents.heard & _ODOMETRY:
+        vehicle = Vehicle(name="replay", motion="constant_velocity")
+        notes.append('motion = "constant_velocity" filled in: no odometry in the log')
+    free = (partial.vehicle or vehicle).motion == "constant_velocity"
+    sensors = _sensors_of(contents, _KINDS + _SIGHTS if partial.map.landmarks else _KINDS, free)
     for sensor in sensors:
         words = f"sensor filled in from the log: {sensor.kind}"
         if sensor.delay_ms:
@@ -231,26 +263,32 @@ def _links_of(logs: tuple[Path, ...]) -> tuple[Link, ...]:
         kind = kind_of(log).link
         if kind == "mavlink":
             links.setdefault(kind, MavlinkLink(name="autopilot", kind="mavlink", url=str(log)))
+        elif kind == "zenoh":
+            links.setdefault(kind, ZenohLink(name="samples", kind="zenoh"))
         else:
             links.setdefault(kind, CanLink(name="bus", kind="can", channel=str(log)))
     return tuple(links.values())
 
 
-def _sensors_of(contents: Contents) -> tuple[Sensor, ...]:
+def _sensors_of(
+    contents: Contents, kinds: tuple[tuple[str, tuple[type, ...]], ...], free: bool
+) -> tuple[Sensor, ...]:
     sensors: list[Sensor] = []
-    for kind, readings in _KINDS:
-        if contents.heard.intersection(readings):
-            sensors.append(Sensor.model_validate({"kind": kind} | _facts_of(kind, contents)))
+    for kind, readings in kinds:
+        if contents.heard.intersection(readings) and not (free and kind in _POINTING):
+            sensors.append(Sensor.model_validate({"kind": kind} | _facts_of(kind, contents, free)))
     return tuple(sensors)
 
 
-def _facts_of(kind: str, contents: Contents) -> dict[str, Any]:
+def _facts_of(kind: str, contents: Contents, free: bool) -> dict[str, Any]:
     """Return what is filled in for a sensor beside its kind."""
+    if kind == "range" and free:
+        return {"estimate": ("bias",), "bias_sigma": RADIO_BIAS}
     if kind == "range":
         return {"estimate": ("scale",)}
     if kind in ("position", "velocity"):
         if contents.simulated:
             return {"delay_ms": SITL_GNSS_DELAY_MS, "correlation_s": 0.0}
-        if contents.heard & _ODOMETRY:
+        if contents.heard & _ODOMETRY and not free:
             return {"estimate": ("delay",)}
     return {}

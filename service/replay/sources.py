@@ -37,8 +37,9 @@ _LINKS: dict[Format, str] = {
     Format.ASC: "can",
     Format.BLF: "can",
     Format.TRC: "can",
+    Format.RECORDING: "zenoh",
 }
-"""What an autopilot logs by itself stands for the link to it."""
+"""What an autopilot logs by itself stands for the link to it; samples come from whoever publishes samples."""
 
 _CAN_SOURCES: dict[Format, FrameSource] = {
     Format.CANDUMP: candump.frames,
@@ -84,6 +85,8 @@ def open_log(path: Path, configuration: Configuration) -> LogReader:
         No link would have heard it, or the link's DBC file cannot be used.
     """
     form = _format_of(path)
+    if form is Format.RECORDING:
+        return _recording(path)
     for link in configuration.link:
         if isinstance(link, MavlinkLink) and _LINKS[form] == "mavlink":
             return _autopilots(path, form, link)
@@ -93,6 +96,15 @@ def open_log(path: Path, configuration: Configuration) -> LogReader:
             except ValueError as error:
                 raise LogError(f'link "{link.name}": {error}') from error
     raise LogError(f"{path} is a {form.value}, and the configuration has no link of kind {_LINKS[form]}")
+
+
+def _recording(path: Path) -> LogReader:
+    """Return the reader of a recording, which names its links itself."""
+    try:
+        from drivers.logs.recording import RecordingReader
+    except ImportError as error:
+        raise LogError(f"{path}: recordings need mcap: pip install 'beliefd[record]'") from error
+    return RecordingReader(path)
 
 
 def _autopilots(path: Path, form: Format, link: MavlinkLink) -> LogReader:

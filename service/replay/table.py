@@ -21,6 +21,9 @@ FIGURES = (
     ("final_m", "end m", "{:.3f}"),
     ("particles_mean", "count", "{:.0f}"),
 )
+SHOWN = 10
+"""Seeds whose figures stand beside a check."""
+
 SHADOW = "EKF"
 """What the extended Kalman filter's rows are called."""
 
@@ -52,6 +55,22 @@ def show(runs: list[Run], console: Console, title: str) -> None:
     console.print(f"  the slowest run: {speed_in_words(slowest)}", highlight=False)
     _show_details(runs[0], console)
     _show_shadow(runs[0], console)
+
+
+def show_checks(runs: list[Run], console: Console) -> None:
+    """Print the questions that a scenario asks: passed by how many runs, and the figures of the first ten seeds."""
+    if not runs[0].checks:
+        return
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1))
+    for heading in ("check", "passed", "found, seed by seed"):
+        table.add_column(heading)
+    for index, check in enumerate(runs[0].checks):
+        given = [run.checks[index] for run in runs]
+        passed = sum(one.passed for one in given)
+        found = "  ".join(figure(one.found, "{:.4g}") for one in given[:SHOWN])
+        style = "" if passed == len(given) else "red"
+        table.add_row(check.name, f"{passed} of {len(given)}", found, style=style)
+    console.print(table)
 
 
 def figure(value: Any, form: str) -> str:

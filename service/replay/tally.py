@@ -10,7 +10,8 @@ import numpy as np
 from service.estimate import Estimate, HealthState
 from service.estimator.shadow import Shadow
 from service.estimator.track import SECOND
-from service.score import UNSCORED, Score, Track, Truth, score
+from service.mixture import Mixture
+from service.score import UNSCORED, Comparison, Score, Track, Truth, compare, figures
 
 SHADOW_INTERVAL = SECOND // 10
 """Nanoseconds between two points of the shadow's track."""
@@ -18,12 +19,13 @@ SHADOW_INTERVAL = SECOND // 10
 
 @dataclass
 class Path2D:
-    """A track under construction: one row a tick that had a position."""
+    """A track under construction: one row a tick that had a position, with its hypotheses where it had several."""
 
     time: list[float] = field(default_factory=list[float])
     north: list[float] = field(default_factory=list[float])
     east: list[float] = field(default_factory=list[float])
     covariance: list[tuple[float, float, float]] = field(default_factory=list[tuple[float, float, float]])
+    mixtures: dict[int, Mixture] = field(default_factory=dict[int, Mixture])
 
     def add(self, time: float, north: float, east: float, covariance: tuple[float, float, float]) -> None:
         """Append one tick; ``covariance``: nn, ne, ee."""
@@ -39,11 +41,17 @@ class Path2D:
             np.asarray(self.north, np.float64),
             np.asarray(self.east, np.float64),
             np.asarray(self.covariance, np.float64).reshape(-1, 3),
+            self.mixtures,
         )
 
-    def score(self, truth: Truth | None) -> Score:
+    def compared(self, truth: Truth | None) -> Comparison | None:
         """Compare with ``truth``, if there is one and there was a position."""
-        return UNSCORED if truth is None or not self.time else score(self.track(), truth)
+        return None if truth is None or not self.time else compare(self.track(), truth)
+
+    def score(self, truth: Truth | None) -> Score:
+        """Return the figures of that."""
+        comparison = self.compared(truth)
+        return UNSCORED if comparison is None else figures(comparison)
 
 
 @dataclass

@@ -73,7 +73,7 @@ def series_of(trace: Trace, truth: Truth | None) -> Series:
 def _beside(track: Track, truth: Truth | None) -> Comparison:
     if truth is None:
         unknown = np.full(track.time.size, np.nan)
-        return Comparison(unknown, unknown)
+        return Comparison(unknown, unknown, unknown, unknown)
     return compare(track, truth)
 
 

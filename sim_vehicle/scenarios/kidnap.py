@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import replace
 
@@ -92,8 +91,9 @@ def _by_ranges(rover: Scenario, evidence: float, strays: list[float]) -> Scenari
 
 def _times(first: float, last: float, chance: np.random.Generator) -> list[float]:
     """Return when the single outliers come, one in each of as many equal parts of the time."""
-    edges = np.linspace(first, last, STRAYS + 1)
-    return [float(chance.uniform(begin, end - 5.0)) for begin, end in itertools.pairwise(edges)]
+    part = (last - first) / STRAYS
+    begins = [first + index * part for index in range(STRAYS)]
+    return [float(chance.uniform(begin, begin + part - 5.0)) for begin in begins]
 
 
 def _events(evidence: float, strays: list[float]) -> tuple[Event, ...]:

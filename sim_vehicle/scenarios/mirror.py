@@ -45,10 +45,11 @@ def draw(seed: int) -> Scenario:
     back = (-0.5 * length - 10.0, aside)
     course = Course(tuple(Waypoint(*place(*corner), speed=speed) for corner in (*legs, back)))
     start = Pose(*place(-0.5 * length, aside), 0.0, along)
+    ends = [place(end * half, 0.0) for end in (-1.0, 1.0)]
     masts = [round(float(height), 2) for height in chance.uniform(1.5, 3.0, 2)]
     sites = tuple(
-        BeaconSite(index, *(round(value, 2) for value in place(end * half, 0.0)), -masts[index])
-        for index, end in enumerate((-1.0, 1.0))
+        BeaconSite(index, round(north, 2), round(east, 2), -masts[index])
+        for index, (north, east) in enumerate(ends)
     )
     scenario = replace(
         rover,

@@ -32,10 +32,14 @@ class Place(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What is known of the place: beacons, and the landmarks' north and east (metres), by their number."""
+    """What is known of the place: beacons, and the landmarks' north and east (metres), by their number.
+
+    ``height`` names the state that is the vehicle's down, if it is one.
+    """
 
     beacons: dict[int, Beacon]
     landmarks: dict[int, tuple[float, float]]
+    height: str | None = None
 
 
 class Bound(Protocol):
@@ -43,6 +47,7 @@ class Bound(Protocol):
 
     settings: Sensor
     surroundings: Surroundings
+    model: SensorModel[Any]
 
     def sigma(self, claimed: float | None) -> float:
         """Return the larger of what the configuration and the reading say; each knows of errors the other does not."""

@@ -6,8 +6,10 @@ import math
 
 from drivers.sample import Range as RangeReading
 from filters.sensing import Range, RangeMeasurement
+from filters.sensing.biased_range import BiasedRange, BiasedRangeMeasurement
 from service.config import Beacon, Sensor
 from service.estimator.measuring.kind import Bound, Kind, Place, Surroundings
+from service.estimator.start import beacon_bias, biased_beacons
 from service.geodesy import LocalFrame
 
 DEFAULT_SIGMA = 0.5
@@ -34,22 +36,34 @@ def beacon_position(
     return None
 
 
-def _model(settings: Sensor, _surroundings: Surroundings) -> Range:
-    scale = "range_scale" if "scale" in settings.estimate else None
-    bias = "range_bias" if "bias" in settings.estimate else None
-    return Range(
-        settings.sigma or DEFAULT_SIGMA, outliers=settings.outliers, span=SPAN, scale=scale, bias=bias
+def _model(settings: Sensor, surroundings: Surroundings) -> Range | BiasedRange:
+    sigma, scale = settings.sigma or DEFAULT_SIGMA, "range_scale" if "scale" in settings.estimate else None
+    biased = biased_beacons(settings, surroundings.beacons)
+    if not biased and not settings.nlos and surroundings.height is None:
+        return Range(sigma, outliers=settings.outliers, span=SPAN, scale=scale)
+    return BiasedRange(
+        sigma,
+        outliers=settings.outliers,
+        span=SPAN,
+        scale=scale,
+        biases={beacon: beacon_bias(beacon) for beacon in biased},
+        nlos=settings.nlos,
+        nlos_length=settings.nlos_length,
+        height=surroundings.height,
     )
 
 
-def _measure(sensor: Bound, reading: RangeReading, place: Place) -> RangeMeasurement | str:
+def _measure(
+    sensor: Bound, reading: RangeReading, place: Place
+) -> RangeMeasurement | BiasedRangeMeasurement | str:
     where = beacon_position(reading, sensor.surroundings.beacons, place.frame)
     if where is None:
         return "no_beacon"
     north, east, down = where
-    return RangeMeasurement(
-        reading.distance, north, east, down - place.down, sensor.spread(reading.sigma, place)
-    )
+    sigma = sensor.spread(reading.sigma, place)
+    if isinstance(sensor.model, BiasedRange):
+        return BiasedRangeMeasurement(reading.distance, north, east, down - place.down, sigma, reading.beacon)
+    return RangeMeasurement(reading.distance, north, east, down - place.down, sigma)
 
 
 RANGE = Kind(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from drivers.maps import landmarks
 from service.config import Configuration
+from service.estimator.height import height_state
 from service.estimator.measuring.kind import Surroundings
 
 
@@ -19,5 +20,7 @@ def surroundings_of(configuration: Configuration) -> Surroundings:
     """
     path = configuration.map.landmarks
     return Surroundings(
-        {beacon.id: beacon for beacon in configuration.beacon}, landmarks.read(Path(path)) if path else {}
+        {beacon.id: beacon for beacon in configuration.beacon},
+        landmarks.read(Path(path)) if path else {},
+        height_state(configuration),
     )
