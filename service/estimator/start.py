@@ -32,13 +32,11 @@ DELAY = "gnss_delay"
 SENSOR_WALK = 1e-4
 """Per √s; how fast a sensor's scale or bias wanders."""
 
-<<<<<<< HEAD
 DELAY_WALK = 1e-3
 """s per √s; a receiver that is busy answers later."""
-=======
+
 POSE = 3
 """Columns that every belief begins with."""
->>>>>>> main
 
 ZERO = (0.0, 0.0)
 MARGINALISED = {
@@ -51,17 +49,12 @@ MARGINALISED = {
 """Mean and spread of the columns whose own spread at the start the motion model knows."""
 
 
-<<<<<<< HEAD
-def sensor_states(configuration: Configuration) -> list[RandomWalk]:
-    """Return the slow states that the sensors ask for, each once."""
-    return [
+def sensor_states(configuration: Configuration) -> list[SlowState]:
+    """Return the slow states that the sensors ask for, each once: ranges have one bias for each beacon."""
+    sampled = [
         RandomWalk(name, DELAY_WALK if name == DELAY else SENSOR_WALK)
         for name in _sensor_sigmas(configuration)
     ]
-=======
-def sensor_states(configuration: Configuration) -> list[SlowState]:
-    """Return the slow states that the sensors ask for, each once: ranges have one bias for each beacon."""
-    sampled = [RandomWalk(name, SENSOR_WALK) for name in _sensor_sigmas(configuration)]
     learned = {
         state.name: state for sensor in configuration.sensor for state in _biases(sensor, configuration)
     }
@@ -84,7 +77,6 @@ def _biases(sensor: Sensor, configuration: Configuration) -> list[Learned]:
     configured = [beacon.id for beacon in configuration.beacon]
     beacons = biased_beacons(sensor, configured)
     return [Learned(beacon_bias(beacon), sensor.bias_walk, sensor.bias_sigma) for beacon in beacons]
->>>>>>> main
 
 
 def _sensor_sigmas(configuration: Configuration) -> dict[str, tuple[float, float]]:

@@ -20,7 +20,6 @@ from drivers.sample import (
     Heading,
     LocalPosition,
     MotionCommand,
-    MotorSpeed,
     Odometer,
     Presence,
     Range,
@@ -53,9 +52,6 @@ ROVER_GYRO_DELAY_MS = 56.0
 _ROVERS = (10, 11)
 """MAV_TYPE of ground rovers and surface boats."""
 
-_ODOMETRY = {Odometer, Speed, MotorSpeed}
-"""Without one of them a receiver's delay does not show: nothing else tells how the vehicle moves."""
-
 _KINDS: tuple[tuple[str, tuple[type, ...]], ...] = (
     ("position", (GeodeticPosition, LocalPosition)),
     ("velocity", (Velocity,)),
@@ -70,7 +66,8 @@ _SIGHTS: tuple[tuple[str, tuple[type, ...]], ...] = (
 _MEASURED = frozenset(reading for _, readings in (*_KINDS, *_SIGHTS) for reading in readings)
 
 _ODOMETRY = frozenset({Odometer, Speed, MotionCommand})
-"""What tells how far the vehicle went; without any of it a motion model with a heading has nothing to go by."""
+"""What tells how far the vehicle went; without any of it a motion model with a heading has nothing to go by, and a
+receiver's delay does not show."""
 
 _POINTING = frozenset({"velocity", "heading"})
 """Kinds that speak of a heading, which a tag has not."""
