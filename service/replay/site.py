@@ -163,7 +163,9 @@ def _filled(partial: Site, logs: tuple[Path, ...], notes: list[str]) -> Configur
     for sensor in sensors:
         words = f"sensor filled in from the log: {sensor.kind}"
         if sensor.delay_ms:
-            words += f", delay_ms = {sensor.delay_ms:.0f}, correlation_s = 0 (SIM_STATE seen: ArduPilot's simulator)"
+            words += f", delay_ms = {sensor.delay_ms:.0f}"
+            words += ", correlation_s = 0" if sensor.correlation_s == 0.0 else ""
+            words += " (SIM_STATE seen: ArduPilot's simulator)"
         notes.append(words + ("".join(f', estimate = ["{state}"]' for state in sensor.estimate)))
     filled = _placed(partial, partial.configuration(vehicle, links, sensors), contents, notes)
     if contents.simulated and contents.rover and "motion" not in partial.model_fields_set:
@@ -285,7 +287,8 @@ def _facts_of(kind: str, contents: Contents, free: bool) -> dict[str, Any]:
         return {"estimate": ("scale",)}
     if kind in ("position", "velocity"):
         if contents.simulated:
-            return {"delay_ms": SITL_GNSS_DELAY_MS, "correlation_s": 0.0}
+            facts: dict[str, Any] = {"delay_ms": SITL_GNSS_DELAY_MS}
+            return facts | ({"correlation_s": 0.0} if kind == "position" else {})
         if contents.heard & _ODOMETRY and not free:
             return {"estimate": ("delay",)}
     return {}
