@@ -93,9 +93,7 @@ def widened(measured: Measurement, variance: float, turn_variance: float) -> Any
     return measured.value if widen is None else widen(measured, variance, turn_variance)
 
 
-def _range(
-    measured: Measurement, variance: float, _turn: float
-) -> RangeMeasurement | BiasedRangeMeasurement:
+def _range(measured: Measurement, variance: float, _turn: float) -> RangeMeasurement | BiasedRangeMeasurement:
     model = cast(Range | BiasedRange, measured.model)
     value = cast(RangeMeasurement | BiasedRangeMeasurement, measured.value)
     sigma = model.sigma if value.sigma is None else value.sigma
