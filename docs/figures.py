@@ -1,34 +1,45 @@
 """The figures of docs/filters/: python docs/figures.py [PAGE ...], all pages if none is named.
 
-A page's script stands beside it and offers ``draw(folder)``. Each runs in a process of its own, so that no script sees
-another's settings. Pictures are SVG, and are made compact on the way. ``beliefd textbook`` makes those of the textbook.
+A page's script stands beside it. It offers ``FIGURES``, functions that draw by the name of the figure, and where a page
+wants matplotlib set otherwise, ``STYLE``. Each runs in a process of its own, so that no script sees another's settings.
+Pictures are SVG, compact and without a date. ``beliefd textbook`` makes those of the textbook.
 """
 
 from __future__ import annotations
 
-import subprocess
+import multiprocessing
+import runpy
 import sys
-import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from io import StringIO
 from pathlib import Path
 
-from service.textbook.style import compact
+import matplotlib as mpl
+
+from service.textbook.style import LOOK, compact
 
 PAGES = Path(__file__).parent / "filters"
-DRAW = """
-import pathlib, runpy, sys
-runpy.run_path(sys.argv[1])["draw"](pathlib.Path(sys.argv[2]))
-"""
+
+
+def draw(page: str) -> None:
+    """Draw the figures of one page, beside it."""
+    mpl.use("Agg")
+    script = runpy.run_path(str(PAGES / f"{page}.py"))
+    for name, figure in script["FIGURES"].items():
+        with mpl.rc_context(LOOK | {"savefig.bbox": "tight"} | script.get("STYLE", {})):
+            text = StringIO()
+            figure().savefig(text, format="svg", metadata={"Date": None})
+        picture = PAGES / f"{page.replace('_', '-')}-{name}.svg"
+        picture.write_text(compact(text.getvalue()), encoding="utf-8")
 
 
 def main(names: list[str]) -> None:
     """Draw the figures of the named pages."""
-    for name in names or sorted(script.stem for script in PAGES.glob("*.py")):
-        print(f"docs/filters/{name}.py", flush=True)
-        with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([sys.executable, "-c", DRAW, PAGES / f"{name}.py", folder], check=True)
-            for picture in sorted(Path(folder).iterdir()):
-                text = picture.read_text(encoding="utf-8")
-                (PAGES / picture.name).write_text(compact(text), encoding="utf-8")
+    fresh = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, fresh, max_tasks_per_child=1) as pages:
+        for name in names or sorted(script.stem for script in PAGES.glob("*.py")):
+            print(f"docs/filters/{name}.py", flush=True)
+            pages.submit(draw, name).result()
 
 
 if __name__ == "__main__":

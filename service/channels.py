@@ -21,6 +21,7 @@ BUDGET = b"B"
 SENSORS = b"S"
 HEALTH = b"H"
 CLOUD = b"P"
+HYPOTHESES = b"Y"
 PROCESSES = b"R"
 
 LARGEST = 256 * 1024

@@ -29,6 +29,14 @@ class HealthState(StrEnum):
     STARVED = "starved"
 
 
+class MotionMode(StrEnum):
+    """How a vehicle moves: it stands, it moves as its wheels say, or its wheels slip."""
+
+    STILL = "still"
+    MOVING = "moving"
+    SLIPPING = "slipping"
+
+
 class Estimate(msgspec.Struct, frozen=True, gc=False):
     """The belief at one tick, predicted to the tick's own time.
 
@@ -47,29 +55,36 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
         Degradation of this tick: 0 full, 1 fewer particles than demanded, 2 measurements thinned, 3
         extraction beyond the Gaussian skipped, 4 the shadow Kalman filter speaks, 5 prediction only.
     position, velocity : Triple
-        North, east, down; m and m/s. ``null`` where unknown (all of it while ``waiting``).
+        North, east, down; m and m/s. ``null`` where unknown (all of it while ``waiting``). Of several hypotheses the
+        leading one's, never a mean between them; ``hypotheses`` has them all.
     heading : float or None
         Radians clockwise from true north, in (-pi, pi].
     position_covariance, velocity_covariance : Triangle
-        Upper triangle nn, ne, nd, ee, ed, dd; m² and (m/s)². Honest for the whole belief.
+        Upper triangle nn, ne, nd, ee, ed, dd; m² and (m/s)². Honest for the whole belief: the mean square of its
+        differences from ``position``, other hypotheses included.
     heading_variance : float or None
         rad²; circular, so at most (pi²)/3 for a heading that could be any.
     latitude, longitude, altitude : float or None
         WGS 84 degrees and metres above mean sea level; ``null`` without an origin.
     radius95 : float or None
-        Radius of the circle about ``position`` that holds the truth with 95 %, metres, horizontal.
+        Radius of the circle about ``position`` that holds the truth with 95 %, metres, horizontal: 95 % of the
+        whole belief, other hypotheses included.
     hypotheses : int
-        How many distinct places the belief holds; 0 while ``waiting``.
+        How many distinct places the belief holds; 0 while ``waiting``. Each has a weight of its own in the value of
+        ``hypotheses``.
     particles, demanded, afforded : int
         In use; needed by the belief's spread (KLD bound); affordable inside the budget.
     effective_sample_size : float or None
         Equation 4.36's inverse: 1 / sum of squared weights.
     reset_counter : int
-        Steps once when the position jumps for another reason than motion.
+        Steps once when the position jumps for another reason than motion: the belief began anew elsewhere, or another
+        hypothesis leads.
     biases : dict[str, tuple[float, float]]
         Slow states: name to value and sigma.
     level_reason : str
         What this tick gave up, and for what; empty at level 0.
+    mode : MotionMode or None
+        How the vehicle moves; ``null`` where that is not estimated.
     """
 
     sequence: int
@@ -96,6 +111,50 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
     reset_counter: int
     biases: dict[str, tuple[float, float]]
     level_reason: str = ""
+    mode: MotionMode | None = None
+
+
+class Hypothesis(msgspec.Struct, frozen=True, gc=False):
+    """One of the distinct places that the belief holds, predicted to the same time as the estimate.
+
+    Attributes
+    ----------
+    name : int
+        Which one: the same hypothesis keeps its name, whatever its weight. A name is never given again.
+    weight : float
+        Its share of the belief, 0 to 1.
+    position : Triple
+        Its own mean: north, east, down; m.
+    position_covariance : Triangle
+        Its own, about its own mean: upper triangle nn, ne, nd, ee, ed, dd; m².
+    heading, heading_variance : float or None
+        Its own; radians, rad².
+    """
+
+    name: int
+    weight: float
+    position: Triple
+    position_covariance: Triangle
+    heading: float | None
+    heading_variance: float | None
+
+
+class Hypotheses(msgspec.Struct, frozen=True, gc=False):
+    """The distinct places that the belief holds: modes of its density with a valley of little density between them.
+
+    Attributes
+    ----------
+    time : float
+        Of validity, Unix seconds.
+    hypotheses : list[Hypothesis]
+        One to eight: first the leader, whose position is that of the estimate, then by weight.
+    elsewhere : float
+        Share of the belief that belongs to none of them.
+    """
+
+    time: float
+    hypotheses: list[Hypothesis]
+    elsewhere: float = 0.0
 
 
 class Health(msgspec.Struct, frozen=True, gc=False):
@@ -417,9 +476,77 @@ class Cloud(msgspec.Struct, frozen=True, gc=False):
     columns: tuple[str, str, str, str] = ("north", "east", "heading", "weight")
 
 
+class Component(msgspec.Struct, frozen=True, gc=False):
+    """One Gaussian of a mixture.
+
+    Attributes
+    ----------
+    weight : float
+        They sum to one.
+    mean : list[float]
+        Of the density's columns.
+    covariance : list[list[float]]
+        Its own.
+    """
+
+    weight: float
+    mean: list[float]
+    covariance: list[list[float]]
+
+
+class Cell(msgspec.Struct, frozen=True, gc=False):
+    """A box and the probability in it.
+
+    Attributes
+    ----------
+    north, east : tuple[float, float]
+        From and to, m.
+    mass : float
+        Over its area, the density in it.
+    """
+
+    north: tuple[float, float]
+    east: tuple[float, float]
+    mass: float
+
+
+class Density(msgspec.Struct, frozen=True, gc=False):
+    """The answer to ``@rpc/density``: a density of the last cloud of particles.
+
+    Attributes
+    ----------
+    extractor : str
+        ``gaussian``, ``kmeans``, ``histogram``, ``tree`` or ``kernel``.
+    time : float
+        Of the cloud, Unix seconds.
+    particles : int
+        Of how many.
+    columns : list[str]
+        The density's dimensions: north, east and heading, or north and east.
+    mean, covariance : list[float], list[list[float]]
+        Of the density, in their order; m and rad.
+    components : list[Component] or None
+        Of ``kmeans``: the mixture.
+    cells : list[Cell] or None
+        Of ``histogram`` and ``tree`` all that hold anything; of ``kernel`` a grid, its density at their middles.
+    bandwidth : list[float] or None
+        Of ``kernel``: north and east, m.
+    """
+
+    extractor: str
+    time: float
+    particles: int
+    columns: list[str]
+    mean: list[float]
+    covariance: list[list[float]]
+    components: list[Component] | None = None
+    cells: list[Cell] | None = None
+    bandwidth: list[float] | None = None
+
+
 def schema() -> dict[str, object]:
     """Return the JSON Schema of every value on the wire, by name (what ``@rpc/schema`` answers)."""
-    values = (Estimate, Budget, Sensors, Health, Status, Cloud)
+    values = (Estimate, Hypotheses, Budget, Sensors, Health, Status, Cloud, Density)
     schemas, components = msgspec.json.schema_components(values, ref_template="#/$defs/{name}")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -50,6 +50,8 @@ class Facts:
         Nanoseconds by which the belief lies behind ``now``: how old even the newest measurement is.
     searching : str
         What is done to find a place for a belief that has none, in the user's words; empty when it has one.
+    ambiguity : str
+        Which places the belief holds, in the user's words, if more than one counts; else empty.
     """
 
     now: int
@@ -60,6 +62,7 @@ class Facts:
     minimum: int
     delay: int = 0
     searching: str = ""
+    ambiguity: str = ""
 
 
 @dataclass(slots=True)
@@ -117,6 +120,8 @@ class HealthMonitor:
         if facts.searching:
             return HealthState.CONVERGING, facts.searching
         silent = self._silence(facts)
+        if silent is not None and facts.ambiguity:
+            return HealthState.AMBIGUOUS, f"{facts.ambiguity}; {silent}"
         if silent is not None:
             return HealthState.DEAD_RECKONING, silent
         if self._readings < LEAST_READINGS:
@@ -127,6 +132,8 @@ class HealthMonitor:
                 HealthState.LOST,
                 f"{self._surprise:.0%} of the measurements of the last {MEMORY:.0f} s disagree with the belief",
             )
+        if facts.ambiguity:
+            return HealthState.AMBIGUOUS, facts.ambiguity
         return self._by_spread(radius, facts.missing)
 
     def _silence(self, facts: Facts) -> str | None:

@@ -17,20 +17,23 @@ from numpy.typing import NDArray
 
 from drivers.sample import Sample
 from service.budget import Meters
-from service.channels import BUDGET, ESTIMATE, HEALTH, SENSORS, Heart, Outlet, cloud
+from service.channels import BUDGET, ESTIMATE, HEALTH, HYPOTHESES, SENSORS, Heart, Outlet, cloud
+from service.checkpoint import Checkpoints
 from service.config import Configuration
 from service.debt import Debt
 from service.decisions import DecisionSender
-from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Sensors, SensorStatus
+from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Hypotheses, Sensors, SensorStatus
 from service.estimator.course import Course, Level
 from service.governor import CLOUD, KALMAN, PER_MEASUREMENT, Decision, Governor, Shape
 from service.inlet import Inlet
+from service.orders import Orders
 from service.schedule import NANOSECONDS, Schedule
 
 INGEST_SHARE = 0.5
 """Share of the budget that taking samples may use in one tick, all links together; the rest waits."""
 
 BEAT_RATE = 10.0
+HYPOTHESES_RATE = 10.0
 CLOUD_RATE = 5.0
 
 _OTHER = "other"
@@ -62,6 +65,10 @@ class Estimator(Protocol):
         """Return every sensor as the belief sees it."""
         ...
 
+    def hypotheses(self, unix: float, /) -> Hypotheses | None:
+        """Return the places that the belief holds; ``None`` while it holds none."""
+        ...
+
     def cloud(self, count: int, /) -> NDArray[np.float32]:
         """Return at most ``count`` particles, shape (n, 4): north, east, heading, weight."""
         ...
@@ -88,6 +95,10 @@ class Loop:
         What the stages cost in the rehearsal, for the governor to start from.
     decisions : DecisionSender, optional
         Where a record of every tick goes.
+    orders : Orders, optional
+        What users tell the belief.
+    checkpoints : Checkpoints, optional
+        Where what survives a restart goes, once a second.
     """
 
     def __init__(
@@ -100,6 +111,8 @@ class Loop:
         heart: Heart,
         shapes: Mapping[str, Shape],
         decisions: DecisionSender | None = None,
+        orders: Orders | None = None,
+        checkpoints: Checkpoints | None = None,
     ) -> None:
         self._rate = configuration.loop.rate
         self._budget_ms = configuration.budget.cpu_ms
@@ -113,6 +126,8 @@ class Loop:
         self._governor = Governor(self._budget_ms * 1e-3, *bounds, shapes, 1.0 / self._rate)
         self._debt = Debt(self._budget_ms * 1e-3, 1.0 / self._rate)
         self._decisions = decisions
+        self._orders = orders
+        self._checkpoints = checkpoints
         self._spare = 0.0
         self._course = Course(overrunning=self._overrunning)
         self._taken = [0] * len(inlets)
@@ -121,6 +136,7 @@ class Loop:
         self._slice_ns = round(INGEST_SHARE * self._budget_ms * 1e-3 * NANOSECONDS / slices)
         self._second = max(1, round(self._rate))
         self._beat_every = max(1, round(self._rate / BEAT_RATE))
+        self._hypotheses_every = max(1, round(self._rate / HYPOTHESES_RATE))
         self._cloud_every = max(1, round(self._rate / CLOUD_RATE))
         self._schedule = Schedule(self._rate, 0)
         self._encoder = msgspec.json.Encoder()
@@ -164,6 +180,8 @@ class Loop:
             before = inlet.samples
             inlet.drain(self._estimator.ingest, time.monotonic_ns() + self._slice_ns)
             self._taken[index] = inlet.samples - before
+        if self._orders is not None:
+            self._orders.take()
         meters.lap("ingest")
         decision = self._governor.decide(self._estimator.demand)
         self._spare = self._budget_ms * 1e-3 - self._governor.reserve(decision.count)
@@ -216,6 +234,12 @@ class Loop:
             self._send(BUDGET, self.budget(estimate))
         elif phase == self._second // 2:
             self._send(SENSORS, self.sensors(estimate.time, now_ns))
+        elif phase == 3 * self._second // 4 and self._checkpoints is not None:
+            self._checkpoints.send(now_ns, round(estimate.time * NANOSECONDS))
+        if self.ticks % self._hypotheses_every == 0 and estimate.level < Level.NO_CLOUD:
+            hypotheses = self._estimator.hypotheses(estimate.time)
+            if hypotheses is not None:
+                self._send(HYPOTHESES, hypotheses)
         if self.ticks % self._beat_every == 0 or self._course.rested:
             self._heart.beat()
 
@@ -301,6 +325,10 @@ class Loop:
         drops["publisher"] = self._outlet.dropped
         if self._decisions is not None:
             drops["decisions"] = self._decisions.dropped
+        if self._checkpoints is not None and self._checkpoints.dropped:
+            drops["checkpoints"] = self._checkpoints.dropped
+        if self._orders is not None and self._orders.malformed:
+            drops["orders"] = self._orders.malformed
         drops["undecodable"] = sum(inlet.undecodable for inlet in self._inlets)
         return drops | self._estimator.drops
 

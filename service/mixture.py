@@ -42,7 +42,7 @@ class Mixture:
     Attributes
     ----------
     weights : (k,) float64
-        They add up to one.
+        They add up to one, less what the belief holds elsewhere.
     means : (k, 2) float64
         North and east, metres.
     covariances : (k, 3) float64

@@ -1,7 +1,7 @@
 """Entry of every process but the supervisor, and started only by it: ``python -m service.process <role> …``.
 
-The roles are ``loop``, ``publisher``, ``recorder`` and ``link``. The arguments are numbers of descriptors that the
-supervisor passes on; see :mod:`service.wiring`.
+The roles are ``loop``, ``publisher``, ``recorder``, ``keeper`` and ``link``. The arguments are numbers of descriptors
+that the supervisor passes on; see :mod:`service.wiring`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import logging
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -26,6 +27,7 @@ from service.wiring import configuration_from
 
 if TYPE_CHECKING:
     from service.crew import Threads
+    from service.estimator import Estimator
 
 _log = logging.getLogger(__name__)
 
@@ -35,10 +37,13 @@ def _arguments() -> argparse.ArgumentParser:
     roles = parser.add_subparsers(dest="role", required=True)
     publisher = roles.add_parser("publisher")
     publisher.add_argument("--estimates", type=int, required=True)
+    publisher.add_argument("--orders", type=int, required=True)
     loop = roles.add_parser("loop")
     loop.add_argument("--heart", type=int, required=True)
     loop.add_argument("--publisher", type=int, required=True)
+    loop.add_argument("--orders", type=int, required=True)
     loop.add_argument("--decisions", type=int)
+    loop.add_argument("--checkpoints", type=int)
     loop.add_argument("--link", action="append", default=[], metavar="NAME=DESCRIPTOR")
     link = roles.add_parser("link")
     link.add_argument("--name", required=True)
@@ -47,7 +52,9 @@ def _arguments() -> argparse.ArgumentParser:
     recorder = roles.add_parser("recorder")
     recorder.add_argument("--records", type=int, required=True)
     recorder.add_argument("--file", type=Path, required=True)
-    for role in (publisher, loop, link, recorder):
+    keeper = roles.add_parser("keeper")
+    keeper.add_argument("--checkpoints", type=int, required=True)
+    for role in (publisher, loop, link, recorder, keeper):
         role.add_argument("--parent", type=int, required=True)
         role.add_argument("--configuration", type=int, required=True)
     return parser
@@ -56,13 +63,20 @@ def _arguments() -> argparse.ArgumentParser:
 def _publisher(configuration: Configuration, arguments: argparse.Namespace) -> None:
     from service.publish.zenoh import run
 
-    run(configuration, inherited(arguments.estimates))
+    run(configuration, inherited(arguments.estimates), inherited(arguments.orders))
 
 
 def _recorder(configuration: Configuration, arguments: argparse.Namespace) -> None:
     from service.recorder import run
 
     run(arguments.file, [link.name for link in configuration.link], inherited(arguments.records))
+
+
+def _keeper(configuration: Configuration, arguments: argparse.Namespace) -> None:
+    from service.checkpoint import path_of
+    from service.keeper import run
+
+    run(path_of(configuration), inherited(arguments.checkpoints))
 
 
 def _link(configuration: Configuration, arguments: argparse.Namespace) -> None:
@@ -89,10 +103,12 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
     kernels.warm(lambda name, done, count: heart.announce(f"compiling kernels, {done} of {count}: {name}"))
 
     from service.budget import Meters
+    from service.checkpoint import Checkpoints
     from service.decisions import DecisionSender
     from service.estimator import Estimator
     from service.inlet import Inlet
     from service.loop import Loop
+    from service.orders import Orders
     from service.rehearsal import rehearse
 
     heart.announce("rehearsing")
@@ -105,20 +121,41 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
     decisions = None
     if arguments.decisions is not None:
         decisions = DecisionSender(Outlet(inherited(arguments.decisions)), len(links))
+    estimator = Estimator(configuration, meters, crew=crew)
+    checkpoints = None
+    if arguments.checkpoints is not None:
+        _resume(estimator, configuration)
+        checkpoints = Checkpoints(configuration, Outlet(inherited(arguments.checkpoints)), estimator.kept)
     loop = Loop(
         configuration,
-        Estimator(configuration, meters, crew=crew),
+        estimator,
         meters,
         [Inlet(name, inherited(int(descriptor))) for name, _, descriptor in links],
         Outlet(inherited(arguments.publisher)),
         heart,
         shapes,
         decisions,
+        Orders(inherited(arguments.orders), estimator.reinitialize),
+        checkpoints,
     )
     stopped = _stop_flag()
     freeze_garbage()
     loop.run(stopped)
     _log.info("loop: %s", loop.summary())
+
+
+def _resume(estimator: Estimator, configuration: Configuration) -> None:
+    """Have the belief go on from a checkpoint that is whole and young enough; the journal says what became of it."""
+    from service.checkpoint import CheckpointError, read
+
+    now = time.monotonic_ns()
+    try:
+        kept = read(configuration, now, time.time_ns())
+        if kept is not None:
+            estimator.resume(kept)
+            _log.info("loop: goes on from a checkpoint of %.1f s ago", (now - kept.time) * 1e-9)
+    except (CheckpointError, ValueError) as error:
+        _log.warning("loop: the checkpoint is not used: %s; starting as [start] says", error)
 
 
 def _crew(budget: Budget) -> Threads | None:
@@ -147,7 +184,7 @@ def _stop_flag() -> Callable[[], bool]:
     return lambda: stop
 
 
-_ROLES = {"publisher": _publisher, "recorder": _recorder, "loop": _loop, "link": _link}
+_ROLES = {"publisher": _publisher, "recorder": _recorder, "keeper": _keeper, "loop": _loop, "link": _link}
 
 
 def main() -> NoReturn:

@@ -9,6 +9,7 @@ on disk in the meantime harms nobody.
 from __future__ import annotations
 
 import fcntl
+import logging
 import os
 import sys
 from collections.abc import Iterator
@@ -21,12 +22,15 @@ from service.config import Configuration, load
 PUBLISHER = "publisher"
 LOOP = "loop"
 RECORDER = "recorder"
+KEEPER = "keeper"
 
 LINK_QUEUE = 2 * 1024 * 1024
 """Bytes: about a second of a busy link. What is older than that is of no use to a loop that was away."""
 
 PUBLISHER_QUEUE = 1024 * 1024
 RECORDER_QUEUE = 1024 * 1024
+KEEPER_QUEUE = 512 * 1024
+ORDER_QUEUE = 64 * 1024
 
 LOOP_START = 180.0
 """Seconds until the first tick: on a slow computer without a cache the kernels are compiled first."""
@@ -38,6 +42,7 @@ LINK_PATIENCE = 5.0
 LINK_START = 30.0
 
 _HEART_QUEUE = 16 * 1024
+_log = logging.getLogger(__name__)
 _F_SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_WRITE | fcntl.F_SEAL_SEAL
 
 
@@ -66,6 +71,10 @@ class Wiring:
         self._estimates = pair(PUBLISHER_QUEUE)
         self._decisions = decisions
         self._records = None if decisions is None else pair(RECORDER_QUEUE)
+        self._checkpoints = pair(KEEPER_QUEUE)
+        self._orders = pair(ORDER_QUEUE)
+        self._keeping = False
+        self._look_for_state()
         self.publisher = PUBLISHER
         """Name of the program that publishes."""
         self.statuses = Outlet(self._estimates.outlet)
@@ -84,13 +93,15 @@ class Wiring:
         os.close(before)
         self._configuration = configuration
         self._disconnect(self._links, {link.name for link in configuration.link})
+        self._look_for_state()
 
     def programs(self) -> list[Program]:
-        """Return publisher, recorder (where one was asked for), loop and links, in this order."""
+        """Return publisher, recorder and keeper (where there is what they need), loop and links, in this order."""
         names = [link.name for link in self._configuration.link]
         return [
             self._publisher(),
             *self._recorder(names),
+            *self._keeper(),
             self._loop(names),
             *(self._link(name) for name in names),
         ]
@@ -103,17 +114,18 @@ class Wiring:
         """Close everything."""
         self._disconnect(self._links, set())
         self._disconnect(self._hearts, set())
-        self._estimates.close()
+        for queue in (self._estimates, self._checkpoints, self._orders):
+            queue.close()
         if self._records is not None:
             self._records.close()
         os.close(self._file)
 
     def _publisher(self) -> Program:
-        inlet = self._estimates.inlet
+        inlet, orders = self._estimates.inlet.fileno(), self._orders.outlet.fileno()
         return Program(
             PUBLISHER,
-            self._command("publisher", "--estimates", inlet.fileno()),
-            (self._file, inlet.fileno()),
+            self._command("publisher", "--estimates", inlet, "--orders", orders),
+            (self._file, inlet, orders),
             self._configuration.model_dump_json(),
             environment=_single_threaded(1),
         )
@@ -130,19 +142,42 @@ class Wiring:
             environment=_single_threaded(1),
         )
 
+    def _look_for_state(self) -> None:
+        """See whether there is a folder for checkpoints; it is not made here: whoever installs decides on it."""
+        directory = self._configuration.state.directory
+        self._keeping = Path(directory).is_dir()
+        if not self._keeping:
+            _log.info("state: there is no directory %s: a restart begins as [start] says", directory)
+
+    def _keeper(self) -> Iterator[Program]:
+        if self._keeping:
+            inlet = self._checkpoints.inlet.fileno()
+            yield Program(
+                KEEPER,
+                self._command("keeper", "--checkpoints", inlet),
+                (self._file, inlet),
+                self._configuration.state.model_dump_json(),
+                environment=_single_threaded(1),
+            )
+
     def _loop(self, names: list[str]) -> Program:
         heart = self._heart(LOOP)
         ends = [self._connection(name).inlet.fileno() for name in names]
         outlet = self._estimates.outlet.fileno()
         named = [word for name, end in zip(names, ends, strict=True) for word in ("--link", f"{name}={end}")]
-        records: list[int] = []
+        orders = self._orders.inlet.fileno()
+        queues: list[int] = [orders]
+        named += ["--orders", str(orders)]
         if self._records is not None:
-            records.append(self._records.outlet.fileno())
-            named += ["--decisions", str(records[0])]
+            queues.append(self._records.outlet.fileno())
+            named += ["--decisions", str(queues[-1])]
+        if self._keeping:
+            queues.append(self._checkpoints.outlet.fileno())
+            named += ["--checkpoints", str(queues[-1])]
         return Program(
             LOOP,
             self._command("loop", "--heart", heart.outlet.fileno(), "--publisher", outlet, *named),
-            (self._file, heart.outlet.fileno(), outlet, *ends, *records),
+            (self._file, heart.outlet.fileno(), outlet, *ends, *queues),
             self._configuration.model_dump_json(exclude={"state"}),
             heart.inlet,
             max(LOOP_PATIENCE, LOOP_PATIENCE_TICKS / self._configuration.loop.rate),

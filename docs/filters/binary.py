@@ -1,33 +1,15 @@
-"""The figures of binary.md: python docs/filters/binary.py [FOLDER]."""
+"""The figures of binary.md, drawn from the project's own code: python docs/figures.py binary."""
 
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
 from filters.binary import BinaryBayesFilter
-
-BLUE, RED, GREY, ORANGE = "#2166ac", "#b2182b", "#666666", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
+from service.textbook.style import BLUE, GREY, ORANGE, RED
 
 
 def liar() -> Figure:
@@ -84,14 +66,4 @@ def trust() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write the figures into a folder."""
-    with plt.rc_context(STYLE):
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, figure in (("binary-liar", liar()), ("binary-trust", trust())):
-            figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
-            plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+FIGURES = {"liar": liar, "trust": trust}

@@ -1,14 +1,8 @@
-"""The figures of density.md, drawn from the project's own code: python docs/filters/density.py [FOLDER]."""
+"""The figures of density.md, drawn from the project's own code: python docs/figures.py density."""
 
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -22,19 +16,7 @@ from filters.density.k_means import KMeans
 from filters.density.kernel import Kernels
 from filters.density.normal import gaussian
 from filters.textbook.extraction import extraction
-
-BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
+from service.textbook.style import BLUE, GREEN, GREY, ORANGE, RED
 
 
 def figure_4_5() -> Figure:
@@ -155,16 +137,4 @@ def fast() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write every figure into a folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with plt.rc_context(STYLE):
-        figures = {"figure-4-5": figure_4_5, "hypotheses": hypotheses, "fast": fast}
-        for name, make in figures.items():
-            figure = make()
-            figure.savefig(folder / f"density-{name}.svg", metadata={"Date": None})
-            plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+FIGURES = {"hypotheses": hypotheses, "fast": fast}

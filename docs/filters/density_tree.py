@@ -1,13 +1,8 @@
-"""The figures of density-tree.md, computed by the filters themselves."""
+"""The figures of density-tree.md, drawn from the project's own code: python docs/figures.py density_tree."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -19,19 +14,8 @@ from filters.cells import CellIntegral
 from filters.density_tree import DensityTree, DensityTreeFilter, Side
 from filters.grid import Axis, Grid, LogDensity
 from filters.histogram import HistogramFilter
+from service.textbook.style import BLUE, GREY, ORANGE, RED
 
-BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
 HALF = 40.0
 SIDES = [Side(-HALF, HALF, 0.02, 2.5)] * 2
 
@@ -168,13 +152,5 @@ def lookup() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write the figures into a folder."""
-    with plt.rc_context(STYLE):
-        for name, figure in (("leaves", leaves()), ("error", equal_error()), ("lookup", lookup())):
-            figure.savefig(folder / f"density-tree-{name}.svg", dpi=150, metadata={"Date": None})
-            plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(__file__).parent)
+FIGURES = {"leaves": leaves, "error": equal_error, "lookup": lookup}
+STYLE = {"savefig.dpi": 150}

@@ -1,14 +1,9 @@
-"""The figures of histogram.md, computed by the filter itself."""
+"""The figures of histogram.md, drawn from the project's own code: python docs/figures.py histogram."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -19,19 +14,7 @@ from filters.grid import Axis, Columns, Grid, LogDensity, circle
 from filters.histogram import HistogramFilter
 from filters.kalman import KalmanFilter
 from filters.regions import Partition, RegionGraph, TopologicalFilter
-
-BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
+from service.textbook.style import BLUE, GREEN, GREY, ORANGE
 
 NOISE, SENSOR = 0.5, 0.8
 CONSTANT = -math.log(SENSOR * math.sqrt(2.0 * math.pi))
@@ -179,13 +162,4 @@ def regions() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write the figures into a folder."""
-    with plt.rc_context(STYLE):
-        for name, figure in (("cells", cells()), ("selective", selective()), ("regions", regions())):
-            figure.savefig(folder / f"histogram-{name}.svg", metadata={"Date": None})
-            plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(__file__).parent)
+FIGURES = {"cells": cells, "selective": selective, "regions": regions}

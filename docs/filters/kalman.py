@@ -1,17 +1,13 @@
-"""The figures of kalman.md: python docs/filters/kalman.py draws them and prints the page's numbers."""
+"""The figures of kalman.md, drawn from the project's own code: python docs/figures.py kalman."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import NamedTuple
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from filters import chi_square
@@ -21,18 +17,8 @@ from filters.linearised.shadow import ShadowFilter
 from filters.motion import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from filters.sensing import Range, RangeMeasurement
+from service.textbook.style import BLUE, GREY, ORANGE, RED
 
-BLUE, RED, ORANGE, GREY = "#2166ac", "#b2182b", "#d95f02", "#666666"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-}
 BEACONS = ((-20.0, 0.0), (20.0, 0.0))
 COUNT, TICKS, TICK = 20_000, 300, 0.1
 TURNS_AT, LOOKS = 150, (120, 300)
@@ -97,8 +83,8 @@ def ellipse(mean: Array, covariance: Array) -> tuple[Array, Array]:
     return east, north
 
 
-def shadow(folder: Path) -> None:
-    """Draw kalman-shadow.svg: a start that both can use, and one that only the particle filter can."""
+def shadow() -> Figure:
+    """Draw a start that both can use, and one that only the particle filter can."""
     figure, axes = plt.subplots(1, 3, figsize=(9.2, 3.7), layout="constrained", width_ratios=(1.25, 1, 1))
     good, wide = drive((-11.0, 6.5), 2.0), drive((-12.0, -1.0), 6.0)
     time = TICK * (np.arange(TICKS) + 1)
@@ -132,8 +118,7 @@ def shadow(folder: Path) -> None:
         axis.set_xlabel("east, m")
         axis.set_title(f"start 9 m off, sigma 6 m: at {TICK * look:.0f} s", fontsize=9)
     axes[1].set_ylabel("north, m")
-    figure.savefig(folder / "kalman-shadow.svg", metadata={"Date": None}, bbox_inches="tight")
-    plt.close(figure)
+    return figure
 
 
 def nis(sensor_sigma: float, believed: float) -> Array:
@@ -152,8 +137,8 @@ def nis(sensor_sigma: float, believed: float) -> Array:
     return np.array(found)
 
 
-def consistency(folder: Path) -> None:
-    """Draw kalman-nis.svg: the NIS of a right and of a wrong noise against chi-square."""
+def consistency() -> Figure:
+    """Draw the NIS of a right and of a wrong noise against chi-square."""
     figure, axis = plt.subplots(figsize=(6.0, 3.2), layout="constrained")
     edges = np.arange(0.0, 20.25, 0.25)
     gate = chi_square.quantile(0.999, 2)
@@ -174,16 +159,7 @@ def consistency(folder: Path) -> None:
     axis.set_xlabel("normalised innovation squared")
     axis.set_ylabel("share per unit")
     axis.legend(loc="upper right")
-    figure.savefig(folder / "kalman-nis.svg", metadata={"Date": None}, bbox_inches="tight")
-    plt.close(figure)
+    return figure
 
 
-def draw(folder: Path) -> None:
-    """Draw every figure of the page."""
-    with plt.rc_context(STYLE):
-        shadow(folder)
-        consistency(folder)
-
-
-if __name__ == "__main__":
-    draw(Path(__file__).parent)
+FIGURES = {"shadow": shadow, "nis": consistency}

@@ -1,6 +1,7 @@
 """The elementary functions against float64, every float32 of their ranges: python docs/filters/kernels.py.
 
-Writes the tables of kernels.md (some minutes) and draws its figure; ``draw`` draws alone, from every 1009th float.
+Writes the tables of kernels.md (some minutes). python docs/figures.py kernels draws the page's figure, from every
+1009th float.
 """
 
 from __future__ import annotations
@@ -11,29 +12,16 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib as mpl
-
-mpl.use("Agg")
-
 import matplotlib.pyplot as plt
 import numba
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from filters.kernels import elementary
 from filters.kernels.compile import KERNEL_FLAGS
+from service.textbook.style import BLUE, ORANGE
 
-BLUE, ORANGE, GREY = "#2166ac", "#d95f02", "#666666"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-}
 CHUNK = 1 << 20
 STRIDE = 1009
 TWO_PI = 2.0 * math.pi
@@ -237,38 +225,36 @@ def measurer_of(function: Function) -> Callable[[Any, Any], None]:
     return evaluate
 
 
-def draw(folder: Path) -> None:
-    """Draw kernels-errors.svg: worst and root mean square error over the ranges."""
+def errors() -> Figure:
+    """Draw the worst and root mean square error over the ranges."""
     panels = (
         (FUNCTIONS[0], (-87.0, 88.0), lambda x: x, "exp, argument", "ulp"),
         (FUNCTIONS[1], (SMALLEST, LARGEST), np.log10, "log, log₁₀ of the argument", "ulp"),
         (FUNCTIONS[5], (-12.0, 12.0), lambda x: x, "sincos, argument, rad", "2⁻²⁴"),
         (FUNCTIONS[5], (1e-3, 1e4), np.log10, "sincos, log₁₀ of the argument, rad", "2⁻²⁴"),
     )
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, 2, figsize=(8.2, 5.0), layout="constrained")
-        for axis, (function, (least, largest), place, label, unit) in zip(axes.flat, panels, strict=True):
-            x = np.concatenate(list(floats(least, largest, STRIDE)))
-            if place is not np.log10:  # floats are dense about zero: even ones show more
-                x = np.linspace(least, largest, 2_000_001).astype(np.float32)
-            y, absolute, ulp = np.zeros_like(x), np.zeros(x.size), np.zeros(x.size)
-            measurer(function)(x, y, absolute, ulp)
-            error = np.abs(ulp if unit == "ulp" else absolute * 2.0**24)
-            ends = np.linspace(place(np.float64(least)), place(np.float64(largest)), 161)
-            bins = np.clip(np.digitize(place(x.astype(np.float64)), ends) - 1, 0, 159)
-            worst, square, number = np.zeros(160), np.zeros(160), np.zeros(160)
-            np.maximum.at(worst, bins, error)
-            np.add.at(square, bins, error**2)
-            np.add.at(number, bins, 1.0)
-            axis.stairs(worst, ends, color=BLUE, linewidth=1.1, label="worst")
-            axis.stairs(np.sqrt(square / np.maximum(number, 1)), ends, color=ORANGE, label="root mean square")
-            axis.set_xlabel(label)
-            axis.set_ylabel(f"error, {unit}")
-            axis.set_ylim(0, None)
-        axes[0, 0].set_ylim(0, 95)
-        axes[0, 0].legend(loc="upper center", ncols=2)
-        figure.savefig(folder / "kernels-errors.svg", metadata={"Date": None}, bbox_inches="tight")
-        plt.close(figure)
+    figure, axes = plt.subplots(2, 2, figsize=(8.2, 5.0), layout="constrained")
+    for axis, (function, (least, largest), place, label, unit) in zip(axes.flat, panels, strict=True):
+        x = np.concatenate(list(floats(least, largest, STRIDE)))
+        if place is not np.log10:  # floats are dense about zero: even ones show more
+            x = np.linspace(least, largest, 2_000_001).astype(np.float32)
+        y, absolute, ulp = np.zeros_like(x), np.zeros(x.size), np.zeros(x.size)
+        measurer(function)(x, y, absolute, ulp)
+        error = np.abs(ulp if unit == "ulp" else absolute * 2.0**24)
+        ends = np.linspace(place(np.float64(least)), place(np.float64(largest)), 161)
+        bins = np.clip(np.digitize(place(x.astype(np.float64)), ends) - 1, 0, 159)
+        worst, square, number = np.zeros(160), np.zeros(160), np.zeros(160)
+        np.maximum.at(worst, bins, error)
+        np.add.at(square, bins, error**2)
+        np.add.at(number, bins, 1.0)
+        axis.stairs(worst, ends, color=BLUE, linewidth=1.1, label="worst")
+        axis.stairs(np.sqrt(square / np.maximum(number, 1)), ends, color=ORANGE, label="root mean square")
+        axis.set_xlabel(label)
+        axis.set_ylabel(f"error, {unit}")
+        axis.set_ylim(0, None)
+    axes[0, 0].set_ylim(0, 95)
+    axes[0, 0].legend(loc="upper center", ncols=2)
+    return figure
 
 
 def replaced(page: str, name: str, table: str) -> str:
@@ -277,9 +263,10 @@ def replaced(page: str, name: str, table: str) -> str:
     return re.sub(pattern, lambda match: match[1] + table + match[2], page, flags=re.DOTALL)
 
 
+FIGURES = {"errors": errors}
+
 if __name__ == "__main__":
     here = Path(__file__).parent
-    draw(here)
     tables = {"edges": edges(), "accuracy": accuracy()}
     text = (here / "kernels.md").read_text(encoding="utf-8")
     for name, table in tables.items():

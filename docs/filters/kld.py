@@ -1,33 +1,15 @@
-"""The figures of kld.md, drawn from the project's own code: python docs/filters/kld.py [FOLDER]."""
+"""The figures of kld.md, drawn from the project's own code: python docs/figures.py kld."""
 
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
 from filters.kld import Demand, bound
-
-BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
+from service.textbook.style import BLUE, GREEN, GREY, ORANGE
 
 
 def asked() -> Figure:
@@ -83,14 +65,5 @@ def draws() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write every figure into a folder."""
-    with plt.rc_context(STYLE):
-        figures = {"bound": asked(), "draws": draws()}
-        for name, figure in figures.items():
-            figure.savefig(folder / f"kld-{name}.svg", dpi=130, metadata={"Date": None})
-            plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+FIGURES = {"bound": asked, "draws": draws}
+STYLE = {"savefig.dpi": 130}

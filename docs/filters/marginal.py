@@ -1,37 +1,23 @@
-"""The figure of marginal.md: a mixed model, the plain particle filter against the marginalised one.
+"""The figure of marginal.md, drawn from the project's own code: python docs/figures.py marginal.
 
-python docs/filters/marginal.py prints the numbers of the page and draws it.
+python docs/filters/marginal.py prints the numbers of the page.
 """
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import NamedTuple
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from filters.kernels.compile import Float32Array
 from filters.marginal import MarginalFilter, MixedObservation, MixedStep
 from filters.particle_set import ParticleSet
+from service.textbook.style import BLUE, ORANGE
 
-BLUE, ORANGE, GREY = "#2166ac", "#d95f02", "#666666"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-}
 SEEDS, STEPS, REFERENCE = 100, 30, 20_000
 COUNTS = (25, 50, 100, 200, 400, 800)
 TRANSITION = np.array([[1.0, 0.3, 0.0], [0.0, 0.92, -0.3], [0.0, 0.3, 0.92]])
@@ -194,36 +180,31 @@ def ratio(ours: Array, theirs: Array) -> tuple[float, float, float]:
     return math.sqrt(ours.mean() / theirs.mean()), float(low), float(high)
 
 
-def picture(ours: Errors, theirs: Errors, folder: Path) -> None:
-    """Draw marginal-error.svg."""
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(1, 2, figsize=(8.2, 3.3), layout="constrained")
-        titles = ("from the answer of 20,000 particles", "from the truth")
-        for axis, kind, title in zip(axes, ("converged", "truth"), titles, strict=True):
-            for errors, colour, mark, label in (
-                (theirs, ORANGE, "s", "plain: four states sampled"),
-                (ours, BLUE, "o", "marginalised: one sampled, three linear"),
-            ):
-                middle, low, high = root_mean(getattr(errors, kind))
-                axis.fill_between(COUNTS, low, high, color=colour, alpha=0.2, linewidth=0)
-                axis.plot(COUNTS, middle, color=colour, marker=mark, markersize=4, label=label)
-            axis.set_xscale("log")
-            axis.set_xticks(COUNTS, [str(count) for count in COUNTS])
-            axis.minorticks_off()
-            axis.set_xlabel("particles")
-            axis.set_title(title, fontsize=9)
-        axes[0].set_yscale("log")
-        axes[0].set_ylabel("error of the mean, root mean square\n(unit of the states)")
-        axes[1].set_ylim(0.3, None)
-        axes[0].legend(loc="lower left")
-        figure.savefig(folder / "marginal-error.svg", metadata={"Date": None}, bbox_inches="tight")
-        plt.close(figure)
+def picture(ours: Errors, theirs: Errors) -> Figure:
+    """Draw both filters' errors by the number of particles."""
+    figure, axes = plt.subplots(1, 2, figsize=(8.2, 3.3), layout="constrained")
+    titles = ("from the answer of 20,000 particles", "from the truth")
+    for axis, kind, title in zip(axes, ("converged", "truth"), titles, strict=True):
+        for errors, colour, mark, label in (
+            (theirs, ORANGE, "s", "plain: four states sampled"),
+            (ours, BLUE, "o", "marginalised: one sampled, three linear"),
+        ):
+            middle, low, high = root_mean(getattr(errors, kind))
+            axis.fill_between(COUNTS, low, high, color=colour, alpha=0.2, linewidth=0)
+            axis.plot(COUNTS, middle, color=colour, marker=mark, markersize=4, label=label)
+        axis.set_xscale("log")
+        axis.set_xticks(COUNTS, [str(count) for count in COUNTS])
+        axis.minorticks_off()
+        axis.set_xlabel("particles")
+        axis.set_title(title, fontsize=9)
+    axes[0].set_yscale("log")
+    axes[0].set_ylabel("error of the mean, root mean square\n(unit of the states)")
+    axes[1].set_ylim(0.3, None)
+    axes[0].legend(loc="lower left")
+    return figure
 
 
-def draw(folder: Path) -> None:
-    """Measure and draw."""
-    picture(*compare(), folder)
-
+FIGURES = {"error": lambda: picture(*compare())}
 
 if __name__ == "__main__":
     marginal, plain = compare()
@@ -235,4 +216,3 @@ if __name__ == "__main__":
                 f"{math.sqrt(many.mean()):.4f}, ratio {ratio(few, many)[0]:.3f} "
                 f"({ratio(few, many)[1]:.3f} to {ratio(few, many)[2]:.3f})"
             )
-    picture(marginal, plain, Path(__file__).parent)

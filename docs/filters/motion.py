@@ -1,13 +1,6 @@
-"""The figure of motion.md, drawn from the project's own code: python docs/filters/motion.py [FOLDER]."""
+"""The figure of motion.md, drawn from the project's own code: python docs/figures.py motion."""
 
 from __future__ import annotations
-
-import sys
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,19 +9,7 @@ from matplotlib.figure import Figure
 from filters.motion import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from filters.sensing import Heading, HeadingMeasurement
-
-BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
+from service.textbook.style import BLUE, GREEN, ORANGE, RED
 
 
 def bias() -> Figure:
@@ -73,13 +54,4 @@ def bias() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write the page's figure into a folder."""
-    with plt.rc_context(STYLE):
-        figure = bias()
-        figure.savefig(folder / "motion-bias.svg", metadata={"Date": None})
-        plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+FIGURES = {"bias": bias}

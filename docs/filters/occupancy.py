@@ -1,15 +1,9 @@
-"""The figures of occupancy.md: python docs/filters/occupancy.py [FOLDER]."""
+"""The figures of occupancy.md, drawn from the project's own code: python docs/figures.py occupancy."""
 
 from __future__ import annotations
 
 import math
-import sys
 from itertools import pairwise
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -20,15 +14,8 @@ from filters.occupancy import InverseRangeModel, OccupancyGrid, Pose
 from filters.particle_set import ParticleSet
 from filters.sectors import RangeSectors
 from filters.sensing.scan import Scan, ScanMeasurement
+from service.textbook.style import RED
 
-BLUE, RED, GREY = "#2166ac", "#b2182b", "#666666"
-STYLE = {
-    "font.size": 9,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-    "image.interpolation": "nearest",
-}
 GEOMETRY = GridGeometry(0.1, 0.0, 0.0, 80, 120)
 EXTENT = (0.0, 12.0, 0.0, 8.0)
 LONGEST = 6.0
@@ -138,14 +125,12 @@ def field() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write the figures into a folder."""
-    with plt.rc_context(STYLE):
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, figure in (("occupancy-building", mapped()), ("occupancy-field", field())):
-            figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
-            plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+FIGURES = {"building": mapped, "field": field}
+STYLE = {
+    "axes.grid": False,
+    "axes.spines.top": True,
+    "axes.spines.right": True,
+    "axes.axisbelow": "line",
+    "grid.color": "#b0b0b0",
+    "image.interpolation": "nearest",
+}

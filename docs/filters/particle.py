@@ -1,15 +1,10 @@
-"""The figures of particle.md, drawn from the project's own code: python docs/filters/particle.py [FOLDER]."""
+"""The figures of particle.md, drawn from the project's own code: python docs/figures.py particle."""
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
+from functools import cache
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -22,26 +17,14 @@ from filters.policy import EffectiveShare, Wear
 from filters.resampling import multinomial, systematic
 from filters.sensing import Range, RangeMeasurement
 from filters.textbook.bias import Step, expected, posterior, simulated
-
-BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
+from service.textbook.style import BLUE, GREY, ORANGE, RED
 
 BEACONS = ((-22.0, -12.0), (24.0, -16.0), (4.0, 26.0))
 YARD, COUNT, TICK, RANGE_SIGMA = 32.0, 40_000, 0.1, 0.5
 Moment = tuple[float, tuple[float, float, float], NDArray[np.float32], float, bool]
 
 
-def drive() -> Iterator[Moment]:
+def _drive() -> Iterator[Moment]:
     """Yield time, truth, cloud, effective share and whether it resampled, of a rover that starts anywhere."""
     rng = np.random.default_rng(7)
     belief = ParticleFilter(Unicycle(0.1, 0.02, 1e-4, 1e-4), capacity=COUNT, seed=7)
@@ -74,8 +57,15 @@ def drive() -> Iterator[Moment]:
         yield tick * TICK, (north, east, heading), cloud, wear.effective_sample_size / COUNT, rule.due(wear)
 
 
-def yard(moments: list[Moment]) -> Figure:
+@cache
+def drive() -> list[Moment]:
+    """Return the drive that two figures show."""
+    return list(_drive())
+
+
+def yard() -> Figure:
     """Particles from a wide start, as ranges come in."""
+    moments = drive()
     chosen = ((0, YARD + 2), (1, YARD + 2), (2, YARD + 2), (3, YARD + 2), (30, 4.0), (150, 4.0))
     figure, axes = plt.subplots(2, 3, figsize=(8.6, 5.9), layout="constrained")
     track = np.array([moment[1] for moment in moments])
@@ -98,10 +88,10 @@ def yard(moments: list[Moment]) -> Figure:
     return figure
 
 
-def effective(moments: list[Moment]) -> Figure:
+def effective() -> Figure:
     """Effective sample size over the same drive, and when it was resampled."""
     figure, axis = plt.subplots(figsize=(6.8, 2.9), layout="constrained")
-    driven = moments[1:]
+    driven = drive()[1:]
     axis.plot(
         [m[0] for m in driven], [m[3] for m in driven], color=BLUE, linewidth=1.2, label="before resampling"
     )
@@ -156,19 +146,5 @@ def still() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write every figure into a folder."""
-    with plt.rc_context(STYLE):
-        figures = {
-            "yard": yard(moments := list(drive())),
-            "effective": effective(moments),
-            "bias": bias(),
-            "still": still(),
-        }
-        for name, figure in figures.items():
-            figure.savefig(folder / f"particle-{name}.svg", dpi=130, metadata={"Date": None})
-            plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+FIGURES = {"yard": yard, "effective": effective, "bias": bias, "still": still}
+STYLE = {"savefig.dpi": 130}

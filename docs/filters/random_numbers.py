@@ -1,34 +1,16 @@
-"""The figure of random-numbers.md, drawn from the project's own code: python docs/filters/random_numbers.py."""
+"""The figure of random-numbers.md, drawn from the project's own code: python docs/figures.py random_numbers."""
 
 from __future__ import annotations
 
 import math
-import sys
 from itertools import pairwise
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
 from filters.kernels import random
-
-BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
+from service.textbook.style import BLUE, GREY, RED
 
 
 def normals() -> Figure:
@@ -71,13 +53,4 @@ def normals() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write the page's figure into a folder."""
-    with plt.rc_context(STYLE):
-        figure = normals()
-        figure.savefig(folder / "random-numbers-normals.svg", metadata={"Date": None})
-        plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+FIGURES = {"normals": normals}

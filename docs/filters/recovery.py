@@ -1,15 +1,9 @@
-"""The figures of recovery.md, drawn from the project's own code: python docs/filters/recovery.py [FOLDER]."""
+"""The figures of recovery.md, drawn from the project's own code: python docs/figures.py recovery."""
 
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 from typing import NamedTuple
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -21,19 +15,7 @@ from filters.proposals import Ring, Rings
 from filters.recovery import AugmentedRecovery
 from filters.regularization import Preserving, Spreading
 from filters.sensing import Range, RangeMeasurement
-
-BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
+from service.textbook.style import BLUE, GREEN, GREY, ORANGE, RED
 
 BEACONS = ((-40.0, -40.0), (45.0, -35.0), (0.0, 50.0))
 COUNT, TICK, TAKEN, STEPS = 2000, 0.1, 100, 200
@@ -158,14 +140,5 @@ def kernels() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write every figure into a folder."""
-    with plt.rc_context(STYLE):
-        figures = {"kidnapped": kidnapped(), "rings": rings(), "kernels": kernels()}
-        for name, figure in figures.items():
-            figure.savefig(folder / f"recovery-{name}.svg", dpi=130, metadata={"Date": None})
-            plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+FIGURES = {"kidnapped": kidnapped, "rings": rings, "kernels": kernels}
+STYLE = {"savefig.dpi": 130}

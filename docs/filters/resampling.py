@@ -1,32 +1,13 @@
-"""The figures of resampling.md, drawn from the project's own code: python docs/filters/resampling.py [FOLDER]."""
+"""The figures of resampling.md, drawn from the project's own code: python docs/figures.py resampling."""
 
 from __future__ import annotations
-
-import sys
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
 from filters.resampling import SCHEMES, ByHypothesis
-
-BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
+from service.textbook.style import BLUE, GREEN, GREY, ORANGE, RED
 
 COLOURS = {"multinomial": RED, "residual": ORANGE, "stratified": GREEN, "systematic": BLUE}
 LINES = {"multinomial": "-", "residual": "--", "stratified": "-.", "systematic": "-"}
@@ -84,14 +65,5 @@ def hypotheses() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write every figure into a folder."""
-    with plt.rc_context(STYLE):
-        figures = {"variance": variance(), "hypotheses": hypotheses()}
-        for name, figure in figures.items():
-            figure.savefig(folder / f"resampling-{name}.svg", dpi=130, metadata={"Date": None})
-            plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+FIGURES = {"variance": variance, "hypotheses": hypotheses}
+STYLE = {"savefig.dpi": 130}

@@ -1,13 +1,6 @@
-"""The figure of sensors.md, drawn from the project's own code: python docs/filters/sensors.py [FOLDER]."""
+"""The figure of sensors.md, drawn from the project's own code: python docs/figures.py sensors."""
 
 from __future__ import annotations
-
-import sys
-from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -15,19 +8,8 @@ from matplotlib.figure import Figure
 
 from filters.particle_set import ParticleSet
 from filters.sensing import Range, RangeMeasurement
+from service.textbook.style import BLUE, GREY, ORANGE
 
-BLUE, RED, GREY, GREEN, ORANGE = "#2166ac", "#b2182b", "#666666", "#1b7837", "#d95f02"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "beliefd",
-    "savefig.bbox": "tight",
-}
 RANGE_SIGMA = 0.5
 
 
@@ -50,13 +32,4 @@ def outlier() -> Figure:
     return figure
 
 
-def draw(folder: Path) -> None:
-    """Write the page's figure into a folder."""
-    with plt.rc_context(STYLE):
-        figure = outlier()
-        figure.savefig(folder / "sensors-outlier.svg", metadata={"Date": None})
-        plt.close(figure)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+FIGURES = {"outlier": outlier}

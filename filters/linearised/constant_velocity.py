@@ -12,7 +12,7 @@ import numpy as np
 
 from filters.extended_kalman import Transition
 from filters.kalman import Matrix
-from filters.motion.constant_velocity import ConstantVelocity, FreeControl, acceleration_covariance
+from filters.motion.constant_velocity import ConstantVelocity, FreeControl, add_acceleration
 from filters.motion.learned import SlowState
 
 _AXES = (("north", "velocity_north"), ("east", "velocity_east"), ("down", "velocity_down"))
@@ -35,9 +35,9 @@ class LinearisedConstantVelocity:
         self.names = (*motion.names, *(walk.name for walk in slow))
         axes = _AXES[: motion.dimensions]
         densities = [motion.acceleration_noise, motion.acceleration_noise, motion.vertical_noise]
-        self._densities = np.array(densities[: motion.dimensions])
-        self._positions = [self.names.index(position) for position, _ in axes]
-        self._velocities = [self.names.index(velocity) for _, velocity in axes]
+        self._variances = np.square(densities[: motion.dimensions])
+        self._positions = np.array([self.names.index(position) for position, _ in axes])
+        self._velocities = np.array([self.names.index(velocity) for _, velocity in axes])
         walks = {walk.name: walk.walk for walk in slow}
         self._walk_variances = np.square([walks.get(name, 0.0) for name in self.names])
 
@@ -46,6 +46,5 @@ class LinearisedConstantVelocity:
         jacobian = np.eye(mean.size)
         jacobian[self._positions, self._velocities] = duration
         noise = np.diag(self._walk_variances * duration)
-        moving = np.array([*self._positions, *self._velocities])
-        noise[np.ix_(moving, moving)] += acceleration_covariance(self._densities, duration)
+        add_acceleration(noise, self._positions, self._velocities, self._variances, duration)
         return Transition(jacobian @ mean, jacobian, noise)

@@ -1,4 +1,4 @@
-"""Velocity linearised: of scale · speed · (cos heading, sin heading), by the heading and by the scale."""
+"""Velocity linearised: of scale · speed · (cos heading, sin heading), by the heading, the scale and the delay."""
 
 from __future__ import annotations
 
@@ -27,9 +27,13 @@ class LinearisedVelocity:
         """Linearise a velocity at ``mean``; see :class:`filters.extended_kalman.LinearisedSensor`."""
         heading, scale = rows["heading"], self.sensor.scale
         speed = measurement.speed * (1.0 if scale is None else float(mean[rows[scale]]))
-        direction = np.array([math.cos(mean[heading]), math.sin(mean[heading])])
+        delay = 0.0 if self.sensor.delay is None else float(mean[rows[self.sensor.delay]])
+        then = float(mean[heading]) - measurement.yaw_rate * delay
+        direction = np.array([math.cos(then), math.sin(then)])
         jacobian = np.zeros((2, mean.size))
         jacobian[:, heading] = (-speed * direction[1], speed * direction[0])
+        if self.sensor.delay is not None:
+            jacobian[:, rows[self.sensor.delay]] = -measurement.yaw_rate * jacobian[:, heading]
         if scale is not None:
             jacobian[:, rows[scale]] = measurement.speed * direction
         sigma = self.sensor.sigma if measurement.sigma is None else measurement.sigma

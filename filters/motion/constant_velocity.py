@@ -214,22 +214,38 @@ def carried(
         F m and F C Fᵀ + Q.
     """
     size = densities.size
-    transition = np.eye(2 * size)
-    transition[:size, size:] = duration * np.eye(size)
-    return transition @ mean, transition @ covariance @ transition.T + acceleration_covariance(
-        densities, duration
-    )
+    moved, spread = mean.copy(), covariance.copy()
+    moved[:size] += duration * mean[size:]
+    spread[:size] += duration * spread[size:]
+    spread[:, :size] += duration * spread[:, size:]
+    add_acceleration(spread, np.arange(size), np.arange(size, 2 * size), np.square(densities), duration)
+    return moved, spread
 
 
-def acceleration_covariance(densities: NDArray[np.float64], duration: float) -> NDArray[np.float64]:
-    """Return what white-noise acceleration adds over ``duration`` seconds to positions, then velocities: Q."""
-    noise = np.diag(np.square(densities))
-    return np.block(
-        [
-            [duration**3 / 3.0 * noise, duration**2 / 2.0 * noise],
-            [duration**2 / 2.0 * noise, duration * noise],
-        ]
-    )
+def add_acceleration(
+    covariance: NDArray[np.float64],
+    positions: NDArray[np.int64],
+    velocities: NDArray[np.int64],
+    variances: NDArray[np.float64],
+    duration: float,
+) -> None:
+    """Add to a covariance what white-noise acceleration does in ``duration`` seconds: Q.
+
+    Parameters
+    ----------
+    covariance : (d, d) float64
+        Written to.
+    positions, velocities : (n,) int
+        The rows of each axis.
+    variances : (n,) float64
+        Squared density of each axis' acceleration.
+    duration : float
+        Seconds.
+    """
+    covariance[positions, positions] += duration**3 / 3.0 * variances
+    covariance[positions, velocities] += duration**2 / 2.0 * variances
+    covariance[velocities, positions] += duration**2 / 2.0 * variances
+    covariance[velocities, velocities] += duration * variances
 
 
 @kernel(

@@ -2,7 +2,9 @@
 
     expected = (north, east) + rotation(heading) · lever
 
-with the lever from the body's centre to the antenna (forward, right), and the outlier part.
+with the lever from the body's centre to the antenna (forward, right), and the outlier part. Where the fix is older than
+its stamp says, by a delay that is itself a slow state, a particle is looked at where it was then
+(:mod:`filters.kernels.latency`).
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from numpy import float32
 
 from filters.kernels.compile import Float32Array, kernel
 from filters.kernels.elementary import log_mixture, sincos
+from filters.kernels.latency import late_fix
 from filters.particle_set import ParticleSet
 from filters.sensing.robust import check, mixture, sigma_refusal
 
@@ -30,12 +33,16 @@ class PositionMeasurement(NamedTuple):
         Metres.
     sigma_north, sigma_east : float or None
         Standard deviations, metres; if only the first is given it holds for both.
+    speed, yaw_rate : float
+        Of the body about that time, m/s forward and rad/s; they matter only with an unknown delay.
     """
 
     north: float
     east: float
     sigma_north: float | None = None
     sigma_east: float | None = None
+    speed: float = 0.0
+    yaw_rate: float = 0.0
 
 
 class Position:
@@ -51,6 +58,8 @@ class Position:
         Side of the square that an outlier may fall in, metres.
     lever : (float, float)
         Where the antenna is in the body's frame, metres forward and right.
+    delay : str, optional
+        Slow state, seconds, by which a fix is older than the time at which it is weighed.
 
     Raises
     ------
@@ -64,6 +73,7 @@ class Position:
         outliers: float = 0.05,
         span: float = 1000.0,
         lever: tuple[float, float] = (0.0, 0.0),
+        delay: str | None = None,
     ) -> None:
         check("position", sigma, outliers, span)
         if not all(math.isfinite(part) for part in lever):
@@ -72,6 +82,7 @@ class Position:
         self.outliers = outliers
         self.span = span
         self.lever = lever
+        self.delay = delay
 
     def _sigmas(self, measurement: PositionMeasurement) -> tuple[float, float]:
         sigma_north = self.sigma if measurement.sigma_north is None else measurement.sigma_north
@@ -86,6 +97,25 @@ class Position:
         sigma_north, sigma_east = self._sigmas(measurement)
         log_density = -_LOG_TWO_PI - math.log(sigma_north) - math.log(sigma_east)
         mixed = mixture(self.outliers, log_density, -2.0 * math.log(self.span))
+        if self.delay is not None:
+            late_fix.direct(
+                particles.columns,
+                particles.log_weights,
+                first,
+                last,
+                particles.row(self.delay),
+                measurement.speed,
+                measurement.yaw_rate,
+                measurement.north,
+                measurement.east,
+                math.sqrt(0.5) / sigma_north,
+                math.sqrt(0.5) / sigma_east,
+                self.lever[0],
+                self.lever[1],
+                mixed.log_inlier,
+                mixed.log_outlier,
+            )
+            return mixed.log_peak
         fix.direct(
             particles.columns,
             particles.log_weights,
@@ -104,8 +134,9 @@ class Position:
 
     def innovation(self, centre: Mapping[str, float], measurement: PositionMeasurement) -> float:
         """Distance between measured and expected position at the centre, metres."""
-        heading = centre["heading"]
-        forward, right = self.lever
+        delay = 0.0 if self.delay is None else centre[self.delay]
+        heading = centre["heading"] - 0.5 * measurement.yaw_rate * delay
+        forward, right = self.lever[0] - measurement.speed * delay, self.lever[1]
         north = centre["north"] + forward * math.cos(heading) - right * math.sin(heading)
         east = centre["east"] + forward * math.sin(heading) + right * math.cos(heading)
         return math.hypot(measurement.north - north, measurement.east - east)

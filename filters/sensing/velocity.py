@@ -3,7 +3,7 @@
     expected = scale · speed · (cos heading, sin heading)
 
 with the speed that odometry or control says, and the odometer's scale if it is a state. So it bears on the
-heading (as a course) and on the scale. With the outlier part.
+heading (as a course) and on the scale. With the outlier part. A delay may be a slow state, as of a position.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy import float32
 
 from filters.kernels.compile import Float32Array, kernel
 from filters.kernels.elementary import log_mixture, sincos
+from filters.kernels.latency import late_course
 from filters.particle_set import ParticleSet
 from filters.sensing.robust import check, mixture, sigma_refusal
 
@@ -33,12 +34,15 @@ class VelocityMeasurement(NamedTuple):
         Forward speed over the same time by odometry or control, m/s; negative is backwards.
     sigma : float or None
         Standard deviation per axis, m/s, if the measurement says so.
+    yaw_rate : float
+        Of the body about that time, rad/s; it matters only with an unknown delay.
     """
 
     north: float
     east: float
     speed: float
     sigma: float | None = None
+    yaw_rate: float = 0.0
 
 
 class Velocity:
@@ -54,6 +58,8 @@ class Velocity:
         Side of the square that an outlier may fall in, m/s; a faster one than half of it is refused.
     scale : str, optional
         Slow state that the speed is multiplied by.
+    delay : str, optional
+        Slow state, seconds, by which a velocity is older than the time at which it is weighed.
 
     Raises
     ------
@@ -62,13 +68,19 @@ class Velocity:
     """
 
     def __init__(
-        self, sigma: float, outliers: float = 0.05, span: float = 100.0, scale: str | None = None
+        self,
+        sigma: float,
+        outliers: float = 0.05,
+        span: float = 100.0,
+        scale: str | None = None,
+        delay: str | None = None,
     ) -> None:
         check("velocity", sigma, outliers, span)
         self.sigma = sigma
         self.outliers = outliers
         self.span = span
         self.scale = scale
+        self.delay = delay
 
     def refusal(self, measurement: VelocityMeasurement) -> str | None:
         """Refuse a velocity outside the span, and a sigma that is not positive."""
@@ -78,12 +90,30 @@ class Velocity:
 
     def weigh(self, particles: ParticleSet, first: int, last: int, measurement: VelocityMeasurement) -> float:
         """Add the log likelihood of a velocity; see :class:`filters.sensing.Sensor`."""
-        north, east, speed, sigma = measurement
+        north, east, speed, sigma, yaw_rate = measurement
         if sigma is None:
             sigma = self.sigma
         log_density = -_LOG_TWO_PI - 2.0 * math.log(sigma)
         mixed = mixture(self.outliers, log_density, -2.0 * math.log(self.span))
         scale_row, scale_slope = (0, 0.0) if self.scale is None else (particles.row(self.scale), 1.0)
+        if self.delay is not None:
+            late_course.direct(
+                particles.columns,
+                particles.log_weights,
+                first,
+                last,
+                particles.row(self.delay),
+                yaw_rate,
+                north,
+                east,
+                speed,
+                math.sqrt(0.5) / sigma,
+                scale_row,
+                scale_slope,
+                mixed.log_inlier,
+                mixed.log_outlier,
+            )
+            return mixed.log_peak
         course.direct(
             particles.columns,
             particles.log_weights,
@@ -103,7 +133,9 @@ class Velocity:
     def innovation(self, centre: Mapping[str, float], measurement: VelocityMeasurement) -> float:
         """Distance between measured and expected velocity at the centre, m/s."""
         speed = measurement.speed * (1.0 if self.scale is None else centre[self.scale])
-        heading = centre["heading"]
+        heading = centre["heading"] - (
+            0.0 if self.delay is None else measurement.yaw_rate * centre[self.delay]
+        )
         return math.hypot(
             measurement.north - speed * math.cos(heading), measurement.east - speed * math.sin(heading)
         )

@@ -135,6 +135,10 @@ class Motion(Section):
     """For constant_velocity: noise of the acceleration, m/s per √s: how fast the velocity wanders."""
     velocity_sigma: NotNegative = 1.0
     """For constant_velocity: what the velocity may be at the start, m/s on each axis (one standard deviation)."""
+    timing_sigma: NotNegative = 0.06
+    """For constant_velocity: how well the latency of the measurements is known, s; without odometry nothing tells it.
+
+    So many seconds of its way is the published region wider along the velocity."""
     dimensions: Literal[2, 3] = 2
     """For constant_velocity: 2 on the plane, 3 with down and its velocity."""
     vertical_noise: NotNegative | None = None
@@ -145,6 +149,10 @@ class Motion(Section):
     """Source of the speed: a message name as the wire has it (WHEEL_DISTANCE, esc.Status, …) or auto."""
     yaw_rate_from: Annotated[str, Field(min_length=1)] = "auto"
     """Source of the yaw rate: a message name (RAW_IMU, HIGHRES_IMU, ahrs.RawIMU, …), wheels, or auto."""
+    yaw_rate_delay_ms: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=500)] = 0.0
+    """By how much a yaw rate of a gyro is older than its stamp, ms: what it is filtered with delays it.
+
+    ArduPilot filters the gyros of rovers and boats at 4 Hz (INS_GYRO_FILTER), which takes 56 ms."""
     wheel_track: Positive | None = None
     """Distance between the left and the right wheels, metres: yaw rate from two wheels that differ."""
     wheel_radius: Positive | None = None
@@ -169,11 +177,19 @@ class Sensor(Section):
     outliers: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=1)] = 0.05
     """Share of readings that mean nothing."""
     estimate: tuple[SlowState, ...] = ()
-    """Slow states to estimate with the pose, of ranges: scale, bias, delay."""
+    """Slow states to estimate with the pose: of ranges scale and bias, of positions and velocities delay.
+
+    A receiver's positions and velocities share one delay; it shows only where odometry tells how the vehicle moves."""
     delay_ms: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=10_000)] = 0.0
     """Known latency before the stamp, ms (ArduPilot SITL GPS: 90)."""
     scale_sigma: NotNegative = 0.05
     """What an estimated scale may be off by at the start (one standard deviation)."""
+    delay_sigma: NotNegative = 0.1
+    """What an estimated delay may be off by at the start, beyond delay_ms, seconds (one standard deviation)."""
+    correlation_s: NotNegative | None = None
+    """Seconds over which its errors stay alike: readings closer together count as one.
+
+    Default: 1 for position, velocity and heading, 0 (every reading counts for itself) for all others."""
     bias_sigma: NotNegative = 0.2
     """What an estimated bias may be at the start, in the reading's unit (one standard deviation)."""
     bias_walk: NotNegative = 0.003

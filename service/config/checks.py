@@ -25,7 +25,6 @@ NOT_BUILT: dict[tuple[str, str], tuple[frozenset[object], str]] = {
         frozenset({"altitude", "terrain", "scan", "speed"}),
         "position, velocity, range, bearing, range_bearing, heading",
     ),
-    ("sensor", "estimate"): (frozenset({"delay"}), "scale, bias"),
     ("link", "send"): (frozenset({"odometry", "gps_input", "global_position_sensor"}), "none"),
 }
 NOT_READ = (("map", "terrain"), ("map", "occupancy"), ("publish", "ros2_domain"))
@@ -98,7 +97,7 @@ def _budget_within_a_tick(raw: Table) -> Iterator[str]:
         return
     if 0 < rate <= 1000 and spent > 1000 / rate:
         tick = f"{1000 / rate:g} ms at loop, rate = {rate:g}"
-        yield f"budget, cpu_ms: needs at most one tick ({tick}), got {spent:g}"
+        yield f"budget, cpu_ms: needs at most one tick ({tick}), got {shown(spent)}"
 
 
 def _not_built(raw: Table) -> Iterator[str]:
@@ -115,12 +114,23 @@ def _not_built(raw: Table) -> Iterator[str]:
             yield f"{name}, {key}: is not in this version; leave it out"
 
 
-def _slow_states_of_ranges(raw: Table) -> Iterator[str]:
+_SLOW_STATES: dict[str, tuple[str, ...]] = {
+    "range": ("scale", "bias"),
+    "position": ("delay",),
+    "velocity": ("delay",),
+}
+_OWNERS = {"scale": "ranges", "bias": "ranges", "delay": "positions and velocities"}
+
+
+def _slow_states_of_others(raw: Table) -> Iterator[str]:
     for place, sensor in entries(raw, "sensor"):
         kind, wanted = sensor.get("kind"), sensor.get("estimate")
-        if kind != "range" and isinstance(kind, str) and isinstance(wanted, list) and wanted:
-            where = place_in_words((*place, "estimate"), raw)
-            yield f"{where}: scale and bias are estimated for ranges only, and this is {shown(kind)}"
+        if not isinstance(kind, str) or not isinstance(wanted, list):
+            continue
+        for state in cast("list[object]", wanted):
+            if isinstance(state, str) and state in _OWNERS and state not in _SLOW_STATES.get(kind, ()):
+                where = place_in_words((*place, "estimate"), raw)
+                yield f"{where}: {state} is estimated for {_OWNERS[state]} only, and this is {shown(kind)}"
 
 
 def _slow_states_only_once(raw: Table) -> Iterator[str]:
@@ -179,7 +189,7 @@ def across_sections(raw: Table) -> list[str]:
         *_area_of_a_global_start(raw),
         *_budget_within_a_tick(raw),
         *_not_built(raw),
-        *_slow_states_of_ranges(raw),
+        *_slow_states_of_others(raw),
         *_slow_states_only_once(raw),
         *_absent_files(raw),
         *wrong_landmarks(raw),

@@ -65,4 +65,4 @@ class State(Section):
     """What survives a restart."""
 
     directory: Annotated[str, Field(min_length=1)] = "/var/lib/beliefd"
-    """Folder for what survives a restart. This version keeps nothing in it: a restart is a new start."""
+    """Folder for the checkpoint, from which a restart goes on; where there is none, a restart is a new start."""

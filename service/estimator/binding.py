@@ -70,6 +70,8 @@ class BoundSensor:
         self._repeats = 1.0
         self.model = self._kind.model(settings, surroundings)
         self._log_outlier = self._kind.log_outlier_density(settings)
+        given = settings.correlation_s
+        self._correlation = self._kind.correlation if given is None else given
 
     @property
     def title(self) -> str:
@@ -122,4 +124,4 @@ class BoundSensor:
         """Note how many readings share one independent error, from the interval to the one before."""
         interval = max(SHORTEST_INTERVAL, (time - self._last_time) / SECOND)
         self._last_time = time
-        self._repeats = max(1.0, self._kind.correlation / interval)
+        self._repeats = max(1.0, self._correlation / interval)

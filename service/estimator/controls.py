@@ -103,6 +103,8 @@ class Controls:
         ``auto``, or the one source (as the wire names it) that may speak.
     throttle : Throttle or None
         Which actuator drives; its command is the last resort for the speed.
+    yaw_rate_delay : int
+        By how much a gyro's yaw rate is older than its stamp, nanoseconds.
 
     Attributes
     ----------
@@ -117,12 +119,14 @@ class Controls:
         speed_from: str = "auto",
         yaw_rate_from: str = "auto",
         throttle: Throttle | None = None,
+        yaw_rate_delay: int = 0,
     ) -> None:
         self.wheel_radius = wheel_radius
         self.wheel_track = wheel_track
         self.speed_from = speed_from
         self.yaw_rate_from = yaw_rate_from
         self.throttle = throttle
+        self.yaw_rate_delay = yaw_rate_delay
         self.out_of_order = 0
         self.implausible = 0
         self._motors: dict[tuple[str, str], dict[int, tuple[int, float]]] = {}
@@ -149,18 +153,15 @@ class Controls:
         reading = sample.reading
         if isinstance(reading, Inertial):
             if reading.angular_velocity is not None:
-                self._take_yaw_rate(
-                    sample,
-                    reading.angular_velocity[2],
-                    YAW_RATE_RANKS.get(sample.source, len(YAW_RATE_RANKS)),
-                )
+                rank = YAW_RATE_RANKS.get(sample.source, len(YAW_RATE_RANKS))
+                self._take_gyro(sample, reading.angular_velocity[2], rank)
             return True
         if isinstance(reading, Rotation):
-            self._take_yaw_rate(sample, reading.yaw_rate, -1)
+            self._take_gyro(sample, reading.yaw_rate, -1)
             return True
         if isinstance(reading, Attitude):
             if reading.angular_velocity is not None:
-                self._take_yaw_rate(sample, reading.angular_velocity[2], 100)
+                self._take_gyro(sample, reading.angular_velocity[2], 100)
             return True
         return self._take_distance(sample)
 
@@ -181,7 +182,7 @@ class Controls:
                 north, east, _ = reading.velocity
                 self._take_speed(sample, north if reading.body else math.hypot(north, east), 3)
             if reading.yaw_rate is not None:
-                self._take_yaw_rate(sample, reading.yaw_rate, 200)
+                self._take_yaw_rate(sample, reading.yaw_rate, sample.time, 200)
             return True
         if isinstance(reading, ActuatorCommand):
             self._take_command(sample, reading)
@@ -225,7 +226,7 @@ class Controls:
         elapsed = sample.time - previous[0]
         if 0 < elapsed < GAP:
             rate = (difference - previous[1]) / self.wheel_track * SECOND / elapsed
-            self._take_yaw_rate(sample, rate, WHEELS_RANK, WHEELS)
+            self._take_yaw_rate(sample, rate, sample.time, WHEELS_RANK, WHEELS)
 
     @staticmethod
     def _may_speak(choice: Choice, wanted: str, sample: Sample, rank: int, name: str = "") -> bool:
@@ -254,7 +255,11 @@ class Controls:
             self._distance = RateTrack()
         self.out_of_order += not self._distance.append(sample.time, speed)
 
-    def _take_yaw_rate(self, sample: Sample, rate: float, rank: int, name: str = "") -> None:
+    def _take_gyro(self, sample: Sample, rate: float, rank: int) -> None:
+        """Feed what a gyro says: of the time before its filter delayed it."""
+        self._take_yaw_rate(sample, rate, sample.time - self.yaw_rate_delay, rank)
+
+    def _take_yaw_rate(self, sample: Sample, rate: float, time: int, rank: int, name: str = "") -> None:
         if not abs(rate) <= FASTEST_TURN:
             self.implausible += 1
             return
@@ -262,7 +267,7 @@ class Controls:
             return
         if not isinstance(self._turn, RateTrack):
             self._turn = RateTrack()
-        self.out_of_order += not self._turn.append(sample.time, rate)
+        self.out_of_order += not self._turn.append(time, rate)
 
     def distance(self, start: int, end: int) -> Motion:
         """Return metres rolled between two times, and the seconds of them without knowledge."""
@@ -300,5 +305,10 @@ def controls_of(settings: MotionSettings) -> Controls:
     if settings.throttle_channel is not None:
         throttle = Throttle(settings.throttle_channel, settings.throttle_speed)
     return Controls(
-        settings.wheel_radius, settings.wheel_track, settings.speed_from, settings.yaw_rate_from, throttle
+        settings.wheel_radius,
+        settings.wheel_track,
+        settings.speed_from,
+        settings.yaw_rate_from,
+        throttle,
+        round(settings.yaw_rate_delay_ms * 1e6),
     )

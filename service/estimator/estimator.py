@@ -19,15 +19,19 @@ from drivers.sample import Sample
 from filters.belief import Belief
 from filters.crew import Crew
 from filters.particle import ParticleFilter
-from service.config import Configuration
-from service.estimate import Estimate, SensorStatus
+from service.checkpoint import Kept
+from service.config import Configuration, Start
+from service.estimate import Estimate, Hypotheses, SensorStatus
 from service.estimator.companion import Companion
 from service.estimator.course import CROWD, Cause, Course, Level
 from service.estimator.deputy import Deputy
 from service.estimator.fusion import KALMAN, Fusion
+from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
+from service.estimator.mode import mode_of
 from service.estimator.output import Output
 from service.estimator.population import Population
+from service.estimator.resuming import begin_again, kept_of
 from service.estimator.search import Search
 from service.estimator.start import Anchor, draw
 from service.estimator.starting import Starter
@@ -87,6 +91,11 @@ class Estimator:
         self._search = Search(configuration, self._vehicle, self._filter.names, seed)
         self._fusion.search = self._search
         self._fusion.companions.append(self._search)
+        self._mode = mode_of(configuration, self._vehicle, self._filter)
+        if self._mode is not None:
+            mode = self._mode
+            self._population.still = lambda: mode.still
+            self._fusion.companions.append(mode)
         self._trust = trust_of(configuration, self._vehicle, self._filter, seed)
         if self._trust is not None:
             self._fusion.trust = self._trust
@@ -94,9 +103,15 @@ class Estimator:
         self._deputy = Deputy(self._vehicle, self._filter, seed)
         self._fusion.deputy = self._deputy
         self._fusion.companions.append(self._deputy)
-        self._output = Output(self._vehicle, self._filter)
+        self._tracker = Tracker(self._filter) if configuration.honesty.hypotheses else None
+        if self._tracker is not None:
+            self._population.tracker = self._tracker
+            self._fusion.companions.append(self._tracker)
+        self._output = Output(self._vehicle, self._filter, self._tracker)
         self._sequence = 0
         self._freely = Course()
+        self._told: Start | None = None
+        self._spoken: Estimate | None = None
 
     def accompany(self, make: Callable[[Vehicle, Belief], C]) -> C:
         """Have a companion told of every call on the belief from now on, and return it."""
@@ -107,6 +122,47 @@ class Estimator:
     def ingest(self, samples: Iterable[Sample]) -> None:
         """Take samples as they arrive; whatever they hold, nothing is raised (:meth:`Intake.take`)."""
         self._intake.take(samples)
+
+    # --- beginning elsewhere ----------------------------------------------------------------------------------------
+
+    def kept(self) -> Kept | None:
+        """Return what a later process may go on from; ``None`` while the belief has no place."""
+        if self._fusion.time is None or self._search.blind:
+            return None
+        return kept_of(self._filter, self._fusion.time, self._vehicle, self._intake, self._spoken)
+
+    def resume(self, kept: Kept) -> None:
+        """Begin, before the first tick, with what another process kept: the way since then is unknown.
+
+        Raises
+        ------
+        ValueError
+            It is of a belief with other dimensions.
+        """
+        begin_again(kept, self._filter, self._vehicle, self._intake)
+        self._search.placed()
+        self._fusion.begin(kept.time)
+        self.reset_counter = kept.reset_counter
+
+    def reinitialize(self, start: Start) -> None:
+        """Begin anew at the next tick as ``start`` says; ``reset_counter`` steps."""
+        self.configuration = self.configuration.model_copy(update={"start": start})
+        self._starter = Starter(self.configuration, self._intake, self._vehicle.controls)
+        self._told = start
+
+    def _obey(self, horizon: int, afforded: int) -> None:
+        """Begin anew as was told since the last tick."""
+        start, self._told = self._told, None
+        if start is None:
+            return
+        self._search.told(self.configuration)
+        self.reset_counter += 1
+        if start.mode == "first_fix":
+            self._fusion.time = None
+            self.health.restart()
+        else:
+            anchor = None if start.position is None else Anchor(start.position, start.sigma)
+            self._start(horizon, anchor, afforded)
 
     # --- one tick -----------------------------------------------------------------------------------------------
 
@@ -132,13 +188,14 @@ class Estimator:
         passed = self._intake.release(horizon)
         self._stopwatch.lap("ingest")
         afforded = min(afforded, self._filter.capacity)
+        self._obey(horizon, afforded)
         if self._fusion.time is None:
             passed = self._begin(horizon, passed, afforded)
         if self._fusion.time is not None:
             self._move(now, horizon, passed, afforded, course)
         oldest = horizon if self._fusion.time is None else self._fusion.time
         self._vehicle.controls.forget(oldest - SECOND)
-        estimate = self._speak(now, unix, afforded, course)
+        estimate = self._spoken = self._speak(now, unix, afforded, course)
         self._sequence += 1
         self._stopwatch.lap(KALMAN if course.deputised else "extraction")
         return estimate
@@ -168,6 +225,9 @@ class Estimator:
         self._find(afforded)
         if self._deputy.speaking:
             return
+        if self._tracker is not None and course.level < Level.NO_CLOUD and not self._search.blind:
+            self._tracker.look(now)
+            self._stopwatch.lap("extraction")
         self._population.fit(afforded)
         if not course.only_predicts:
             self._population.reckon(now)
@@ -178,6 +238,8 @@ class Estimator:
             course.deputised = self._deputy.take_over()
         if self._deputy.speaking and not course.deputised:
             self._deputy.hand_back(self._population.clamp(self.demand, afforded))
+            if self._tracker is not None and self._fusion.time is not None:
+                self._tracker.started(self._fusion.time)
             self._stopwatch.lap("resampling")
 
     def _find(self, afforded: int) -> None:
@@ -208,6 +270,7 @@ class Estimator:
             self.configuration.budget.particles_min,
             now - self._intake.horizon,
             self._search.status,
+            "" if self._tracker is None else self._tracker.ambiguity(),
         )
         if pose is not None:
             self._search.published(pose.moments)
@@ -224,7 +287,8 @@ class Estimator:
             level_reason=course.reason(self.demand, afforded) if pose else "",
             demanded=self.demand,
             afforded=afforded,
-            reset_counter=self.reset_counter,
+            reset_counter=self.reset_counter + (0 if self._tracker is None else self._tracker.jumps),
+            mode=None if self._mode is None or pose is None else self._mode.mode,
         )
 
     @property
@@ -245,6 +309,10 @@ class Estimator:
     def sensors(self, now: int) -> list[SensorStatus]:
         """Return every sensor's status, heard or not; rates are over the time since the last call."""
         return self._intake.statuses(now, None if self._trust is None else self._trust.log_odds)
+
+    def hypotheses(self, unix: float) -> Hypotheses | None:
+        """Return the places that the belief held at the last tick, ``unix`` (s); ``None`` while it has none."""
+        return None if self._fusion.time is None else self._output.hypotheses(unix)
 
     def cloud(self, count: int) -> NDArray[np.float32]:
         """Return a fair sub-sample of the particles at the last tick: north, east, heading, weight; (count, 4)."""

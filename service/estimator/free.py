@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.sample import AnyReading
-from filters.belief import Belief, Displacement, Moments
+from filters.belief import Belief, Displacement, Joint, Moments
 from filters.density.gaussian import radius
 from filters.motion.constant_velocity import (
     DOWN,
@@ -55,6 +55,7 @@ class FreeVehicle:
             settings.vertical_noise,
             settings.vertical_sigma,
         )
+        self.timing_sigma = settings.timing_sigma
         self.controls: Controls = controls_of(settings)
         self.slow_states: list[SlowState] = sensor_states(configuration)
         self._height = Height() if height_state(configuration) is None else None
@@ -129,8 +130,11 @@ class FreeCarrier:
         self._vehicle = vehicle
         self._belief = belief
         motion = vehicle.motion
-        self._names = _PLANE if motion.dimensions == 2 else _SPACE
+        self._timing = vehicle.timing_sigma
         self._axes = motion.dimensions
+        self._moving = 2 * motion.dimensions
+        self._standing = DOWN in belief.names and motion.dimensions == 2
+        self._names = ((*_PLANE, DOWN) if self._standing else _PLANE) if motion.dimensions == 2 else _SPACE
         self._densities = np.array(
             [motion.acceleration_noise] * 2 + [motion.vertical_noise] * (self._axes - 2)
         )
@@ -140,40 +144,43 @@ class FreeCarrier:
         """Return the belief carried from ``belief_time`` to ``now`` (nanoseconds)."""
         duration = (now - belief_time) / SECOND
         joint = self._belief.joint(self._names)
-        before, covariance_before = joint.mean, joint.covariance
-        mean, covariance = carried(before, covariance_before, self._densities, duration)
-        step = mean - before
-        self.displacement = Displacement(float(step[0]), float(step[1]), 0.0)
+        axes, moving = self._axes, self._moving
+        mean, covariance = carried(
+            joint.mean[:moving], joint.covariance[:moving, :moving], self._densities, duration
+        )
+        north, east = (float(mean[axis] - joint.mean[axis]) for axis in range(2))
+        self.displacement = Displacement(north, east, 0.0)
         moments = self._belief.moments(self.displacement)
         pose = np.zeros((3, 3))
-        pose[:2, :2] = covariance[:2, :2]
+        going = self._timing * mean[axes : axes + 2]
+        pose[:2, :2] = covariance[:2, :2] + np.outer(going, going)
         return Pose(
             moments,
             pose,
             None,
-            self._down(moments, mean, covariance),
-            *self._velocity(mean[self._axes :], covariance[self._axes :, self._axes :]),
+            self._down(joint, mean, covariance, duration),
+            *self._velocity(mean[axes:], covariance[axes:, axes:]),
             radius(pose[:2, :2], 0.95),
         )
 
     def _down(
-        self, moments: Moments, mean: NDArray[np.float64], covariance: NDArray[np.float64]
+        self, joint: Joint, mean: NDArray[np.float64], covariance: NDArray[np.float64], duration: float
     ) -> tuple[float, float, float, float] | None:
+        """Return down, its variance, and its covariances with north and east."""
+        if self._standing:
+            last = joint.covariance[self._moving]
+            nd, ed = last[:2] + duration * last[2:4]
+            return float(joint.mean[self._moving]), float(last[self._moving]), float(nd), float(ed)
         if self._axes > 2:
             return float(mean[2]), float(covariance[2, 2]), float(covariance[0, 2]), float(covariance[1, 2])
         height = self._vehicle.height
-        if DOWN not in moments.names:
-            return None if height is None else (*height, 0.0, 0.0)
-        joint = self._belief.joint(("north", "east", DOWN))
-        nd, ed, dd = joint.covariance[2]
-        return float(joint.mean[2]), float(dd), float(nd), float(ed)
+        return None if height is None else (*height, 0.0, 0.0)
 
-    def _velocity(
-        self, mean: NDArray[np.float64], covariance: NDArray[np.float64]
-    ) -> tuple[Triple, Triangle]:
-        (nn, ne), ee = covariance[0, :2], covariance[1, 1]
-        plane = float(nn), float(ne), float(ee)
-        if self._axes == 2:
-            return (float(mean[0]), float(mean[1]), None), (plane[0], plane[1], None, plane[2], None, None)
+    @staticmethod
+    def _velocity(mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> tuple[Triple, Triangle]:
+        nn, ne, ee = float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1])
+        north, east = float(mean[0]), float(mean[1])
+        if mean.size == 2:
+            return (north, east, None), (nn, ne, None, ee, None, None)
         nd, ed, dd = (float(value) for value in covariance[:, 2])
-        return (float(mean[0]), float(mean[1]), float(mean[2])), (plane[0], plane[1], nd, plane[2], ed, dd)
+        return (north, east, float(mean[2])), (nn, ne, nd, ee, ed, dd)

@@ -8,8 +8,11 @@ from typing import Any
 from filters.belief import Displacement, Moments
 from filters.motion.constant_velocity import DOWN, VELOCITY_DOWN, VELOCITY_EAST, VELOCITY_NORTH
 from filters.particle import ParticleFilter
-from service.estimate import Estimate, Triangle, Triple
+from service.estimate import Estimate, Hypotheses, Triangle, Triple
 from service.estimator.carrier import Pose
+from service.estimator.hypotheses import Tracker
+from service.estimator.leading import Leading
+from service.estimator.places import places
 from service.estimator.vehicle import Vehicle
 from service.geodesy import LocalFrame
 
@@ -21,12 +24,18 @@ UNKNOWN_TRIANGLE: Triangle = (None, None, None, None, None, None)
 
 
 class Output:
-    """Carries moments from the belief's time to now and writes them down."""
+    """Carries moments from the belief's time to now and writes them down.
 
-    def __init__(self, vehicle: Vehicle, belief: ParticleFilter[Any]) -> None:
+    With a ``tracker`` they are the leading hypothesis's (:mod:`service.estimator.leading`).
+    """
+
+    def __init__(self, vehicle: Vehicle, belief: ParticleFilter[Any], tracker: Tracker | None = None) -> None:
         self._vehicle = vehicle
         self._belief = belief
-        self._carrier = vehicle.carrier(belief)
+        self._tracker = tracker
+        self._pose: Pose | None = None
+        self._leading = None if tracker is None else Leading(belief, tracker)
+        self._carrier = vehicle.carrier(belief if self._leading is None else self._leading)
 
     @property
     def displacement(self) -> Displacement | None:
@@ -35,7 +44,19 @@ class Output:
 
     def at(self, belief_time: int, now: int) -> Pose:
         """Return the belief carried from ``belief_time`` to ``now`` (nanoseconds)."""
-        return self._carrier.at(belief_time, now)
+        pose = self._carrier.at(belief_time, now)
+        if self._leading is not None:
+            pose = self._leading.honest(pose, self._carrier.displacement)
+        self._pose = pose
+        return pose
+
+    def hypotheses(self, unix: float) -> Hypotheses | None:
+        """Write the hypotheses of the last :meth:`at` down, with the Unix time (s) that it was for."""
+        if self._pose is None:
+            return None
+        found = [] if self._leading is None else self._leading.hypotheses
+        name = 1 if self._tracker is None else self._tracker.leader
+        return places(unix, self._pose, found, name)
 
     def estimate(self, pose: Pose | None, frame: LocalFrame | None, **figures: Any) -> Estimate:
         """Write ``pose`` down; ``figures`` are the fields of :class:`Estimate` that the belief does not know."""
@@ -74,7 +95,7 @@ class Output:
             longitude=longitude,
             altitude=altitude,
             radius95=pose.radius95,
-            hypotheses=1,
+            hypotheses=self._tracker.count if sampled and self._tracker is not None else 1,
             particles=self._belief.count if sampled else 0,
             effective_sample_size=pose.moments.effective_sample_size if sampled else None,
             biases=self._slow_states(pose.moments),

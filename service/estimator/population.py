@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from filters.kld import Demand
 from filters.particle import ParticleFilter
-from filters.policy import EffectiveShare, Policy, Wear
+from filters.policy import EffectiveShare, Policy, Wear, WhenStill
 from service.config import Configuration
+from service.estimator.hypotheses import Tracker
 from service.estimator.stopwatch import Stopwatch
 from service.estimator.track import SECOND
 
-RESAMPLING: Policy = EffectiveShare(0.5)
-"""When to resample: equation 4.36's effective sample size below half of the particles there are."""
+RESAMPLING: Policy = WhenStill(still=EffectiveShare(0.05), moving=EffectiveShare(0.5))
+"""When to resample: equation 4.36's effective sample size below half of the particles there are. What is forgotten
+while nothing moves is never brought back, so then the weights multiply up until hardly any particle is left."""
 
 POSITION_BIN = 0.25
 HEADING_BIN = 0.1
@@ -41,7 +44,9 @@ class Population:
     Attributes
     ----------
     demand : int
-        How many the belief needs (KLD bound), as reckoned last.
+        How many the belief needs (KLD bound, and enough for each hypothesis), as reckoned last.
+    tracker : Tracker or None
+        Draws by hypothesis while there are several.
     """
 
     def __init__(
@@ -58,6 +63,8 @@ class Population:
             maximum=self._budget.particles_max,
         )
         self.demand = self._budget.particles_min
+        self.tracker: Tracker | None = None
+        self.still: Callable[[], float] = lambda: 0.0
         self._reckoned = -(2**62)
 
     def clamp(self, wanted: int, afforded: int) -> int:
@@ -67,13 +74,17 @@ class Population:
     def resample_if_worn(self, afforded: int) -> None:
         """Normalise the weights, and draw anew where they differ too much (lines 8 to 11 of Table 4.3)."""
         self._belief.normalize()
-        if RESAMPLING.due(Wear(self._belief.count, self._belief.effective_sample_size)):
+        if RESAMPLING.due(Wear(self._belief.count, self._belief.effective_sample_size, self.still())):
             self.resample(afforded)
         self._stopwatch.lap("resampling")
 
     def resample(self, afforded: int) -> None:
         """Draw as many particles as are demanded and afforded."""
-        self._belief.resample(self.clamp(self.demand, afforded))
+        count = self.clamp(self.demand, afforded)
+        if self.tracker is not None and self.tracker.divided:
+            self.tracker.draw(count)
+        else:
+            self._belief.resample(count)
 
     def fit(self, afforded: int) -> None:
         """Shrink at once when the budget shrank; grow between resamplings only when the demand grew clearly."""
@@ -86,6 +97,9 @@ class Population:
     def reckon(self, now: int) -> None:
         """Reckon the demand, if the last time is long enough ago."""
         if now - self._reckoned >= DEMAND_INTERVAL:
-            self.demand = self._demand_of.particles(self._belief)
+            demand = self._demand_of.particles(self._belief)
+            if self.tracker is not None:
+                demand = min(max(demand, self.tracker.demand), self._budget.particles_max)
+            self.demand = demand
             self._reckoned = now
             self._stopwatch.lap("resampling")

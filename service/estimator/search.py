@@ -166,7 +166,6 @@ class Search:
         self._watching = configuration.honesty.recovery
         self._way = way_of(vehicle, configuration, (MEMORY + TRIAL) / SECOND)
         self._heard: deque[Heard] = deque(maxlen=MOST)
-        self._since: int | None = None
         self._pieces = max(1, math.ceil(PIECES / (DURATION * configuration.loop.rate)))
         self._quest: Quest | None = None
         self._later: list[Heard] = []
@@ -183,8 +182,6 @@ class Search:
         self._kinds.clear()
         self._moments = None
         self._drop()
-        if self._since is None:
-            self._since = time
 
     def moved(self, start: int, end: int) -> None:
         """Hear that the belief moved from ``start`` to ``end``."""
@@ -215,6 +212,17 @@ class Search:
             self._judge(self._rival, one)
         elif self._quest is not None:
             self._later.append(one)
+
+    def placed(self) -> None:
+        """Hear that the belief has a place, whatever the configuration says of its start."""
+        self.blind = False
+
+    def told(self, configuration: Configuration) -> None:
+        """Hear that the belief is to begin anew as ``configuration`` says now; what was heard before is not used."""
+        self._configuration = configuration
+        self.blind = configuration.start.mode == "global"
+        self._heard.clear()
+        self._drop()
 
     # --- the evidence -----------------------------------------------------------------------------------------------
 

@@ -26,8 +26,14 @@ class Anchor(NamedTuple):
     sigma: tuple[float, float, float]
 
 
+DELAY = "gnss_delay"
+"""The slow state of a receiver's delay: one for its positions and its velocities, which come of the same fix."""
+
 SENSOR_WALK = 1e-4
 """Per √s; how fast a sensor's scale or bias wanders."""
+
+DELAY_WALK = 1e-3
+"""s per √s; a receiver that is busy answers later."""
 
 POSE = 3
 """Columns that every belief begins with."""
@@ -45,7 +51,10 @@ MARGINALISED = {
 
 def sensor_states(configuration: Configuration) -> list[SlowState]:
     """Return the slow states that the sensors ask for, each once: ranges have one bias for each beacon."""
-    sampled = [RandomWalk(name, SENSOR_WALK) for name in _sensor_sigmas(configuration)]
+    sampled = [
+        RandomWalk(name, DELAY_WALK if name == DELAY else SENSOR_WALK)
+        for name in _sensor_sigmas(configuration)
+    ]
     learned = {
         state.name: state for sensor in configuration.sensor for state in _biases(sensor, configuration)
     }
@@ -78,6 +87,8 @@ def _sensor_sigmas(configuration: Configuration) -> dict[str, tuple[float, float
             sigmas.setdefault(f"{sensor.kind}_scale", (1.0, sensor.scale_sigma))
         if "bias" in sensor.estimate and sensor.kind != "range":
             sigmas.setdefault(f"{sensor.kind}_bias", (0.0, sensor.bias_sigma))
+        if "delay" in sensor.estimate:
+            sigmas.setdefault(DELAY, (0.0, sensor.delay_sigma))
     return sigmas
 
 

@@ -11,7 +11,7 @@ import struct
 from collections import Counter
 from dataclasses import dataclass
 
-from service.publish.topics import BUDGET, CLOUD_BYTES, ESTIMATE, HEALTH, PARTICLES, SENSORS
+from service.publish.topics import BUDGET, CLOUD_BYTES, ESTIMATE, HEALTH, HYPOTHESES, PARTICLES, SENSORS
 
 PROCESSES = "processes"
 TAGS = {
@@ -20,6 +20,7 @@ TAGS = {
     b"S": SENSORS.key,
     b"H": HEALTH.key,
     b"P": PARTICLES.key,
+    b"Y": HYPOTHESES.key,
     b"R": PROCESSES,
 }
 

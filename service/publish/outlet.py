@@ -21,6 +21,9 @@ from service.publish.topics import HEALTH, HISTORY, JSON, LIVE, QUERIES, TOPICS,
 Answer = Callable[[], bytes]
 """Makes the JSON of one answer, or raises :class:`RefusedError`."""
 
+Request = Callable[[bytes], bytes]
+"""Takes what the payload of a query asks for and makes the JSON of the answer, or raises :class:`RefusedError`."""
+
 _WAITING_QUERIES = 64
 
 
@@ -43,16 +46,26 @@ class Outlet:
         Whose keys.
     answers : dict[str, Answer]
         What each of :data:`~service.publish.topics.QUERIES` answers.
+    requests : dict[str, Request], optional
+        What takes each of those that ask for something.
     """
 
-    def __init__(self, opened: Opened, keys: Keys, answers: dict[str, Answer]) -> None:
+    def __init__(
+        self,
+        opened: Opened,
+        keys: Keys,
+        answers: dict[str, Answer],
+        requests: dict[str, Request] | None = None,
+    ) -> None:
         self._opened = opened
         self._keys = keys
         self._answers = answers
+        self._requests = requests or {}
         session = opened.session
         self._publishers = {topic.key: _declare(session, keys, topic) for topic in TOPICS}
         self._queryables = {
-            key: session.declare_queryable(keys.of(key), _ring(), complete=True) for key in QUERIES
+            key: session.declare_queryable(keys.of(key), _ring(), complete=True)
+            for key in (*QUERIES, *self._requests)
         }
         self._token = session.liveliness().declare_token(keys.of(LIVE))
 
@@ -97,9 +110,14 @@ class Outlet:
 
     def _reply(self, key: str, query: zenoh.Query) -> None:
         try:
-            query.reply(self._keys.of(key), self._answers[key](), encoding=JSON)
+            query.reply(self._keys.of(key), self._made(key, query), encoding=JSON)
         except RefusedError as refusal:
             query.reply_err(msgspec.json.encode({"reason": str(refusal)}), encoding=JSON)
+
+    def _made(self, key: str, query: zenoh.Query) -> bytes:
+        if key not in self._requests:
+            return self._answers[key]()
+        return self._requests[key](b"" if query.payload is None else query.payload.to_bytes())
 
 
 def _ring() -> zenoh.handlers.RingChannel[zenoh.Query]:

@@ -21,6 +21,8 @@ from service.estimate import (
     Distribution,
     Estimate,
     Health,
+    Hypotheses,
+    Hypothesis,
     LinkStatus,
     ProcessStatus,
     Publishing,
@@ -34,6 +36,8 @@ from service.publish.topics import CLOUD_BYTES, HISTORY, LIVE, PARTICLES, PREFIX
 
 VALUES = (
     Estimate,
+    Hypotheses,
+    Hypothesis,
     Health,
     Budget,
     StageCost,

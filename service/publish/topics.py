@@ -52,17 +52,22 @@ SLOW = Topic("estimate/slow", "Estimate", f"{JSON};beliefd.Estimate", zenoh.Prio
 PARTICLES = Topic(
     "particles", "Cloud", "application/octet-stream;beliefd.Cloud", zenoh.Priority.BACKGROUND, "5 Hz"
 )
+HYPOTHESES = Topic(
+    "hypotheses", "Hypotheses", f"{JSON};beliefd.Hypotheses", zenoh.Priority.DATA_HIGH, "10 Hz"
+)
 BUDGET = Topic("budget", "Budget", f"{JSON};beliefd.Budget", zenoh.Priority.DATA_LOW, "1 Hz")
 SENSORS = Topic("sensors", "Sensors", f"{JSON};beliefd.Sensors", zenoh.Priority.DATA_LOW, "1 Hz")
 HEALTH = Topic("health", "Health", f"{JSON};beliefd.Health", zenoh.Priority.INTERACTIVE_HIGH, "on change")
 
-TOPICS = (ESTIMATE, SLOW, PARTICLES, BUDGET, SENSORS, HEALTH)
+TOPICS = (ESTIMATE, SLOW, HYPOTHESES, PARTICLES, BUDGET, SENSORS, HEALTH)
 
 LATEST = "@rpc/latest"
 STATUS = "@rpc/status"
 CONFIG = "@rpc/config"
 SCHEMA = "@rpc/schema"
 QUERIES = (LATEST, STATUS, CONFIG, SCHEMA)
+
+REINITIALIZE = "@rpc/reinitialize"
 
 LIVE = "@live"
 

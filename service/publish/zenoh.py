@@ -20,12 +20,14 @@ from collections.abc import Callable
 import zenoh
 
 from service.backoff import BackOff
+from service.channels import Outlet as Queue
 from service.config import Configuration
 from service.publish.answers import Book, answers
+from service.publish.desk import Desk
 from service.publish.inbox import PROCESSES, Inbox, Value
-from service.publish.outlet import Outlet
+from service.publish.outlet import Outlet, Request
 from service.publish.session import Opened, SessionError, close, open_embedded, open_from_file, plain
-from service.publish.topics import ESTIMATE, HEALTH, HISTORY, SLOW, Keys
+from service.publish.topics import ESTIMATE, HEALTH, HISTORY, REINITIALIZE, SLOW, Keys
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +37,7 @@ _UPKEEP_PERIOD = 1.0
 _CLOSING = 1.0
 
 
-def run(configuration: Configuration, estimates: socket.socket) -> None:
+def run(configuration: Configuration, estimates: socket.socket, orders: socket.socket | None = None) -> None:
     """Publish until SIGTERM.
 
     Parameters
@@ -44,6 +46,8 @@ def run(configuration: Configuration, estimates: socket.socket) -> None:
         Says whose keys, and which session.
     estimates : socket.socket
         The receiving end of the datagram socket pair that the loop and the supervisor write to.
+    orders : socket.socket, optional
+        The sending end of the one that the loop reads: what users tell the belief.
 
     Notes
     -----
@@ -57,7 +61,7 @@ def run(configuration: Configuration, estimates: socket.socket) -> None:
         stop = True
 
     signal.signal(signal.SIGTERM, _stop)
-    publisher = Publisher(configuration, estimates, opener(configuration))
+    publisher = Publisher(configuration, estimates, opener(configuration), orders)
     while not stop:
         publisher.step()
     if not publisher.close(_CLOSING):
@@ -86,16 +90,24 @@ class Publisher:
         Where the datagrams come from.
     open_session : callable
         Opens a session or raises :class:`~service.publish.session.SessionError`.
+    orders : socket.socket, optional
+        Where what users tell the belief goes; without it they are refused.
     """
 
     def __init__(
-        self, configuration: Configuration, estimates: socket.socket, open_session: Callable[[], Opened]
+        self,
+        configuration: Configuration,
+        estimates: socket.socket,
+        open_session: Callable[[], Opened],
+        orders: socket.socket | None = None,
     ) -> None:
         self._open_session = open_session
         self._keys = Keys(configuration.publish.prefix, configuration.vehicle.name)
         self._inbox = Inbox(estimates)
         self._book = Book()
         self._answers = answers(configuration, self._book, self._inbox)
+        desk = Desk(configuration, None if orders is None else Queue(orders))
+        self._requests: dict[str, Request] = {REINITIALIZE: desk.reinitialize}
         self._outlet: Outlet | None = None
         self._changes: deque[Value] = deque(maxlen=HISTORY)
         self._slow_at = 0.0
@@ -165,7 +177,7 @@ class Publisher:
             self._retry_later(str(error))
             return
         try:
-            self._outlet = Outlet(opened, self._keys, self._answers)
+            self._outlet = Outlet(opened, self._keys, self._answers, self._requests)
         except zenoh.ZError as error:
             close(opened.session, _CLOSING)
             self._retry_later(plain(error))

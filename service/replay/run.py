@@ -201,7 +201,8 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
         for now, batch, afforded, course in _ticks(chain([first], samples), plan):
             estimator.ingest(batch)
             estimate = estimator.tick(now, now, afforded, course)
-            tally.add(estimate)
+            several = estimate.hypotheses > 1
+            tally.add(estimate, estimator.hypotheses(estimate.time) if several else None)
             teller.add(estimate)
             if teller.due(estimate.time):
                 teller.ask(estimate.time, estimator.sensors(now))

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from drivers.sample import (
     BeaconPlace,
@@ -21,6 +21,7 @@ from drivers.sample import (
     LocalPosition,
     MotionCommand,
     Odometer,
+    Presence,
     Range,
     RangeBearing,
     Speed,
@@ -45,6 +46,12 @@ from service.replay.surroundings import area_about, beacons_of
 SITL_GNSS_DELAY_MS = 90.0
 """ArduPilot's simulator reports a fix this long after it was true."""
 
+ROVER_GYRO_DELAY_MS = 56.0
+"""What a second-order Butterworth low pass delays: sqrt(2) / (2 pi f), at INS_GYRO_FILTER's 4 Hz for rovers."""
+
+_ROVERS = (10, 11)
+"""MAV_TYPE of ground rovers and surface boats."""
+
 _KINDS: tuple[tuple[str, tuple[type, ...]], ...] = (
     ("position", (GeodeticPosition, LocalPosition)),
     ("velocity", (Velocity,)),
@@ -59,10 +66,14 @@ _SIGHTS: tuple[tuple[str, tuple[type, ...]], ...] = (
 _MEASURED = frozenset(reading for _, readings in (*_KINDS, *_SIGHTS) for reading in readings)
 
 _ODOMETRY = frozenset({Odometer, Speed, MotionCommand})
-"""What tells how far the vehicle went; without any of it a motion model with a heading has nothing to go by."""
+"""What tells how far the vehicle went; without any of it a motion model with a heading has nothing to go by, and a
+receiver's delay does not show."""
 
 _POINTING = frozenset({"velocity", "heading"})
 """Kinds that speak of a heading, which a tag has not."""
+
+SHORTEST_HORIZON_MS = 50.0
+"""For a tag: no odometry bridges the way from the horizon to now, so waiting for nothing would cost accuracy."""
 
 RADIO_BIAS = 0.03
 """Metres; what the antenna delay of a calibrated ultra-wideband radio leaves in its ranges."""
@@ -155,15 +166,22 @@ def _filled(partial: Site, logs: tuple[Path, ...], notes: list[str]) -> Configur
     for sensor in sensors:
         words = f"sensor filled in from the log: {sensor.kind}"
         if sensor.delay_ms:
-            words += f", delay_ms = {sensor.delay_ms:.0f} (SIM_STATE seen: ArduPilot's simulator)"
+            words += f", delay_ms = {sensor.delay_ms:.0f}"
+            words += ", correlation_s = 0" if sensor.correlation_s == 0.0 else ""
+            words += " (SIM_STATE seen: ArduPilot's simulator)"
         notes.append(words + ("".join(f', estimate = ["{state}"]' for state in sensor.estimate)))
     filled = _placed(partial, partial.configuration(vehicle, links, sensors), contents, notes)
-    if "loop" in partial.model_fields_set or contents.horizon_ms <= filled.loop.horizon_ms:
+    if contents.simulated and contents.rover and "motion" not in partial.model_fields_set:
+        notes.append(
+            f"yaw_rate_delay_ms = {ROVER_GYRO_DELAY_MS:.0f}: ArduPilot filters a rover's gyro at 4 Hz"
+        )
+        motion = filled.motion.model_copy(update={"yaw_rate_delay_ms": ROVER_GYRO_DELAY_MS})
+        filled = filled.model_copy(update={"motion": motion})
+    horizon_ms = max(contents.horizon_ms, SHORTEST_HORIZON_MS if free else filled.loop.horizon_ms)
+    if "loop" in partial.model_fields_set or horizon_ms == filled.loop.horizon_ms:
         return filled
-    notes.append(
-        f"horizon_ms = {contents.horizon_ms:.0f} filled in from the log: its measurements arrive that late"
-    )
-    loop = filled.loop.model_copy(update={"horizon_ms": contents.horizon_ms})
+    notes.append(f"horizon_ms = {horizon_ms:.0f} filled in from the log: its measurements arrive that late")
+    loop = filled.loop.model_copy(update={"horizon_ms": horizon_ms})
     return filled.model_copy(update={"loop": loop})
 
 
@@ -191,6 +209,8 @@ class Contents(NamedTuple):
 
     Attributes
     ----------
+    rover : bool
+        Whether an autopilot said that it drives on the ground or on water.
     places : list[BeaconPlace]
         What was said of the beacons' places.
     ranges : list[float]
@@ -199,6 +219,7 @@ class Contents(NamedTuple):
 
     heard: set[type]
     simulated: bool
+    rover: bool
     horizon_ms: float
     places: list[BeaconPlace]
     ranges: list[float]
@@ -210,11 +231,14 @@ def _contents_of(configuration: Configuration, logs: tuple[Path, ...]) -> Conten
     latencies: list[int] = []
     places: dict[int, BeaconPlace] = {}
     ranges: list[float] = []
+    rover = False
     for sample in merged(readers):
         reading = sample.reading
         kind = type(reading)
         heard.add(kind)
-        if isinstance(reading, BeaconPlace):
+        if isinstance(reading, Presence):
+            rover |= reading.type in _ROVERS
+        elif isinstance(reading, BeaconPlace):
             places.setdefault(reading.beacon, reading)
         elif isinstance(reading, Range):
             ranges.append(reading.distance)
@@ -222,7 +246,7 @@ def _contents_of(configuration: Configuration, logs: tuple[Path, ...]) -> Conten
             latencies.append(sample.received - sample.time)
     simulated = any("SIM_STATE" in reader.kinds() for reader in readers)
     horizon_ms = _horizon_for(latencies, SITL_GNSS_DELAY_MS if simulated else 0.0)
-    return Contents(heard, simulated, horizon_ms, list(places.values()), ranges)
+    return Contents(heard, simulated, rover, horizon_ms, list(places.values()), ranges)
 
 
 def _horizon_for(latencies: list[int], delay_ms: float) -> float:
@@ -253,11 +277,20 @@ def _sensors_of(
     sensors: list[Sensor] = []
     for kind, readings in kinds:
         if contents.heard.intersection(readings) and not (free and kind in _POINTING):
-            delay = SITL_GNSS_DELAY_MS if contents.simulated and kind in ("position", "velocity") else 0.0
-            facts: dict[str, object] = {"kind": kind, "delay_ms": delay}
-            if kind == "range":
-                facts |= (
-                    {"estimate": ("bias",), "bias_sigma": RADIO_BIAS} if free else {"estimate": ("scale",)}
-                )
-            sensors.append(Sensor.model_validate(facts))
+            sensors.append(Sensor.model_validate({"kind": kind} | _facts_of(kind, contents, free)))
     return tuple(sensors)
+
+
+def _facts_of(kind: str, contents: Contents, free: bool) -> dict[str, Any]:
+    """Return what is filled in for a sensor beside its kind."""
+    if kind == "range" and free:
+        return {"estimate": ("bias",), "bias_sigma": RADIO_BIAS}
+    if kind == "range":
+        return {"estimate": ("scale",)}
+    if kind in ("position", "velocity"):
+        if contents.simulated:
+            facts: dict[str, Any] = {"delay_ms": SITL_GNSS_DELAY_MS}
+            return facts | ({"correlation_s": 0.0} if kind == "position" else {})
+        if contents.heard & _ODOMETRY and not free:
+            return {"estimate": ("delay",)}
+    return {}

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from service.estimate import Estimate, HealthState
+from service.estimate import Estimate, HealthState, Hypotheses
 from service.estimator.shadow import Shadow
 from service.estimator.track import SECOND
 from service.mixture import Mixture
@@ -27,8 +27,17 @@ class Path2D:
     covariance: list[tuple[float, float, float]] = field(default_factory=list[tuple[float, float, float]])
     mixtures: dict[int, Mixture] = field(default_factory=dict[int, Mixture])
 
-    def add(self, time: float, north: float, east: float, covariance: tuple[float, float, float]) -> None:
-        """Append one tick; ``covariance``: nn, ne, ee."""
+    def add(
+        self,
+        time: float,
+        north: float,
+        east: float,
+        covariance: tuple[float, float, float],
+        mixture: Mixture | None = None,
+    ) -> None:
+        """Append one tick; ``covariance``: nn, ne, ee; ``mixture``: its hypotheses, if there are several."""
+        if mixture is not None:
+            self.mixtures[len(self.time)] = mixture
         self.time.append(time)
         self.north.append(north)
         self.east.append(east)
@@ -63,20 +72,37 @@ class Tally:
     particles: int = 0
     last: Estimate | None = None
 
-    def add(self, estimate: Estimate) -> None:
-        """Count one tick."""
+    def add(self, estimate: Estimate, places: Hypotheses | None = None) -> None:
+        """Count one tick, with the places that were published beside it where there are several."""
         self.last = estimate
         self.health[estimate.health] += 1
         self.particles += estimate.particles
         north, east, _ = estimate.position
         nn, ne, _, ee, _, _ = estimate.position_covariance
         if north is not None and east is not None and None not in (nn, ne, ee):
-            self.path.add(estimate.time, north, east, (nn or 0.0, ne or 0.0, ee or 0.0))
+            mixture = None if places is None else mixture_of(places)
+            self.path.add(estimate.time, north, east, (nn or 0.0, ne or 0.0, ee or 0.0), mixture)
 
     @property
     def ticks(self) -> int:
         """How many there were."""
         return sum(self.health.values())
+
+
+def mixture_of(places: Hypotheses) -> Mixture | None:
+    """Return the density of published hypotheses; ``None`` for fewer than two.
+
+    What the belief holds elsewhere has a share and no place, so it has no density either.
+    """
+    found = places.hypotheses
+    if len(found) < 2:
+        return None
+    covariances = [one.position_covariance for one in found]
+    return Mixture(
+        np.array([one.weight for one in found], np.float64),
+        np.array([[one.position[0] or 0.0, one.position[1] or 0.0] for one in found], np.float64),
+        np.array([[c[0] or 0.0, c[1] or 0.0, c[3] or 0.0] for c in covariances], np.float64),
+    )
 
 
 @dataclass(frozen=True)

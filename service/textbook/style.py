@@ -22,19 +22,19 @@ CHI_SQUARE_95 = 5.991
 _PLACES = re.compile(r' (?:d|x|y)="[^"]*"|translate\([^)]*\)')
 _LONG_NUMBER = re.compile(r"(\d\.\d\d)\d+")
 
-_STYLE: dict[str, Any] = {
+LOOK: dict[str, Any] = {
     "font.size": 9,
-    "axes.titlesize": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
     "grid.color": "#e6e6e6",
     "axes.axisbelow": True,
     "legend.frameon": False,
-    "legend.fontsize": 8,
     "svg.hashsalt": "beliefd",
-    "savefig.dpi": 100,
 }
+"""What every picture of the project has in common, as matplotlib's settings."""
+
+_STYLE = LOOK | {"axes.titlesize": 9, "legend.fontsize": 8, "savefig.dpi": 100}
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from drivers.sample import LinkReport, Sample, SampleBatch, Speed, encode
 from service.budget import Meters
 from service.channels import Heart, Outlet, Pair, pair, undertaking
 from service.config import Configuration, load
-from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Sensors, SensorStatus
+from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Hypotheses, Sensors, SensorStatus
 from service.estimator import Course, Level
 from service.governor import Shape
 from service.inlet import Inlet
@@ -77,6 +77,9 @@ class SmallEstimator:
 
     def sensors(self, now_ns: int, /) -> list[SensorStatus]:
         return [SensorStatus("range/bus/1", 5.0, None, 7, {"late": 1}, 0.1, 0.2)]
+
+    def hypotheses(self, unix: float, /) -> Hypotheses | None:
+        return Hypotheses(unix, [])
 
     def cloud(self, count: int, /) -> NDArray[np.float32]:
         return np.ones((min(count, 10), 4), np.float32)

@@ -36,6 +36,10 @@ latitude = 40.0
 longitude = -80.0
 altitude = 300.0
 """
+DESCRIPTORS = (
+    *("--configuration", "--heart", "--publisher", "--link", "--samples", "--estimates"),
+    *("--orders", "--checkpoints"),
+)
 BUS = """
 [[link]]
 name = "bus"
@@ -92,7 +96,7 @@ def test_descriptors_are_all_that_the_command_names(wiring: Wiring) -> None:
         named = {
             int(word.rpartition("=")[2])
             for option, word in pairwise(words)
-            if option in ("--configuration", "--heart", "--publisher", "--link", "--samples", "--estimates")
+            if option in DESCRIPTORS
         }
         assert named == set(program.descriptors)
 
@@ -173,3 +177,16 @@ def test_a_recorder_runs_where_a_decision_log_is_asked_for(file: Path, tmp_path:
     assert int(recorder.command[recorder.command.index("--records") + 1]) in recorder.descriptors
     with contextlib.closing(Wiring(file)) as wiring:
         assert "recorder" not in {program.name for program in wiring.programs()}
+
+
+def test_a_keeper_where_there_is_a_folder_for_it_and_none_where_there_is_not(file: Path) -> None:
+    """The folder is not made: whoever installs decides whether a restart goes on or begins anew."""
+    folder = file.parent / "state"
+    file.write_text(file.read_text() + f'[state]\ndirectory = "{folder}"\n')
+    with contextlib.closing(Wiring(file)) as wiring:
+        assert "keeper" not in settings(wiring)
+        folder.mkdir()
+        wiring.reload()
+        programs = {program.name: program for program in wiring.programs()}
+        ends = [programs[name].command for name in ("keeper", "loop")]
+        assert all("--checkpoints" in command for command in ends)

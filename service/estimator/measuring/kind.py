@@ -10,10 +10,16 @@ from typing import Any, NamedTuple, Protocol
 from filters.sensing import Sensor as SensorModel
 from service.config import Beacon, Sensor
 from service.estimator.controls import Controls
+from service.estimator.start import DELAY
 from service.geodesy import LocalFrame
 
 NOMINAL_OUTLIERS = 0.01
 """Share of readings that mean nothing by which health judges a sensor that claims to have none."""
+
+
+def delay_state(settings: Sensor) -> str | None:
+    """Return the slow state of the sensor's delay, if it is to be estimated."""
+    return DELAY if "delay" in settings.estimate else None
 
 
 class Place(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from drivers.sample import GeodeticPosition, LocalPosition
 from filters.sensing import Position, PositionMeasurement
 from service.config import Sensor
-from service.estimator.measuring.kind import Bound, Kind, Place, Surroundings
+from service.estimator.measuring.kind import Bound, Kind, Place, Surroundings, delay_state
 from service.geodesy import LocalFrame
 
 DEFAULT_SIGMA = 3.0
@@ -26,7 +26,9 @@ def position_of(
 
 
 def _model(settings: Sensor, _surroundings: Surroundings) -> Position:
-    return Position(settings.sigma or DEFAULT_SIGMA, outliers=settings.outliers, span=SPAN)
+    return Position(
+        settings.sigma or DEFAULT_SIGMA, outliers=settings.outliers, span=SPAN, delay=delay_state(settings)
+    )
 
 
 def _measure(
@@ -35,7 +37,9 @@ def _measure(
     fix = position_of(reading, place.frame)
     if fix is None:
         return "no_origin"
-    return PositionMeasurement(fix[0], fix[1], sensor.spread(reading.sigma_horizontal, place))
+    sigma = sensor.spread(reading.sigma_horizontal, place)
+    speed, yaw_rate = place.controls.speed(place.time), place.controls.yaw_rate(place.time)
+    return PositionMeasurement(fix[0], fix[1], sigma, sigma, speed, yaw_rate)
 
 
 POSITION = Kind(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from drivers.sample import Velocity as VelocityReading
 from filters.sensing import Velocity, VelocityMeasurement
 from service.config import Sensor
-from service.estimator.measuring.kind import Bound, Kind, Place, Surroundings
+from service.estimator.measuring.kind import Bound, Kind, Place, Surroundings, delay_state
 
 DEFAULT_SIGMA = 0.3
 SPAN = 100.0
@@ -16,7 +16,11 @@ SLOWEST_COURSE = 0.3
 
 def _model(settings: Sensor, _surroundings: Surroundings) -> Velocity:
     return Velocity(
-        settings.sigma or DEFAULT_SIGMA, outliers=settings.outliers, span=SPAN, scale="odometry_scale"
+        settings.sigma or DEFAULT_SIGMA,
+        outliers=settings.outliers,
+        span=SPAN,
+        scale="odometry_scale",
+        delay=delay_state(settings),
     )
 
 
@@ -24,7 +28,8 @@ def _measure(sensor: Bound, reading: VelocityReading, place: Place) -> VelocityM
     speed = place.controls.speed(place.time)
     if abs(speed) < SLOWEST_COURSE:
         return "standing"
-    return VelocityMeasurement(reading.north, reading.east, speed, sensor.spread(reading.sigma, place))
+    sigma = sensor.spread(reading.sigma, place)
+    return VelocityMeasurement(reading.north, reading.east, speed, sigma, place.controls.yaw_rate(place.time))
 
 
 VELOCITY = Kind(

@@ -40,7 +40,7 @@ from filters.sensing import (
 
 Array = NDArray[np.float64]
 
-SLOW = tuple(RandomWalk(name, 0.01) for name in ("range_scale", "range_bias", "heading_bias"))
+SLOW = tuple(RandomWalk(name, 0.01) for name in ("range_scale", "range_bias", "heading_bias", "gnss_delay"))
 MOTION = LinearisedUnicycle(Unicycle(0.1, 0.05, 0.01, 0.02, 0.03, 0.04), SLOW)
 ROWS = {name: row for row, name in enumerate(MOTION.names)}
 
@@ -56,6 +56,14 @@ SENSORS: dict[str, tuple[Any, Any]] = {
     "velocity with a scale": (
         Velocity(0.2, scale="odometry_scale"),
         VelocityMeasurement(1.0, 0.5, -1.2, 0.1),
+    ),
+    "position of an unknown delay": (
+        Position(1.0, lever=(1.5, -0.4), delay="gnss_delay"),
+        PositionMeasurement(1.0, 2.0, 0.5, 0.7, 3.0, 0.8),
+    ),
+    "velocity of an unknown delay": (
+        Velocity(0.2, scale="odometry_scale", delay="gnss_delay"),
+        VelocityMeasurement(1.0, 0.5, 1.2, 0.1, -0.6),
     ),
     "heading": (Heading(0.1), HeadingMeasurement(2.0)),
     "bearing": (Bearing(0.1), BearingMeasurement(0.3, 12.0, -15.0)),
@@ -89,6 +97,7 @@ states = st.builds(
         st.floats(0.8, 1.2),
         st.floats(-1.0, 1.0),
         st.floats(-0.5, 0.5),
+        st.floats(-0.3, 0.3),
     ),
 )
 
@@ -130,14 +139,14 @@ def test_the_unicycles_noise_is_that_of_its_distance_turn_and_walks(
         noisy = UnicycleControl(distance + source[0] / walked[4], turn + source[1])  # of the true distance
         return MOTION.move(walked, noisy, duration).mean
 
-    derivative = numerical_jacobian(moved, np.zeros(2 + 5), angles=(2,))
+    derivative = numerical_jacobian(moved, np.zeros(2 + 6), angles=(2,))
     # the division by the scale, above, must not let the scale's own walk in
     derivative[:, 3] = numerical_jacobian(
-        lambda x: MOTION.move(mean + x * (np.arange(8) == 4), UnicycleControl(distance, turn), duration).mean,
+        lambda x: MOTION.move(mean + x * (np.arange(9) == 4), UnicycleControl(distance, turn), duration).mean,
         np.zeros(1),
         angles=(2,),
     )[:, 0]
-    variance = duration * np.square([0.1, 0.05, 0.01, 0.02, 0.01, 0.01, 0.01])
+    variance = duration * np.square([0.1, 0.05, 0.01, 0.02, 0.01, 0.01, 0.01, 0.01])
     variance[0] += 0.03**2 * abs(distance)
     variance[1] += 0.04**2 * abs(turn)
     expected = (derivative * variance) @ derivative.T
@@ -147,7 +156,7 @@ def test_the_unicycles_noise_is_that_of_its_distance_turn_and_walks(
 
 
 def test_a_stretch_that_was_not_measured_adds_what_it_says() -> None:
-    still = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    still = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
     noise = MOTION.move(still, UnicycleControl(0.0, 0.0, 2.0, 0.3), 0.0).noise
     np.testing.assert_allclose(np.diagonal(noise)[:3], [4.0, 0.0, 0.09], atol=1e-15)
 
@@ -180,7 +189,7 @@ def test_the_unicycle_moves_as_the_particle_filters_does() -> None:
 
 
 def test_where_there_is_no_direction_the_derivative_is_zero() -> None:
-    at_beacon = np.array([12.0, -15.0, 0.3, 0.0, 1.0, 1.0, 0.0, 0.0])
+    at_beacon = np.array([12.0, -15.0, 0.3, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
     for name in ("range with scale and bias", "bearing", "range and bearing"):
         model, measurement = MODELS[name]
         jacobian = model.expect(ROWS, at_beacon, measurement).jacobian
@@ -190,4 +199,4 @@ def test_where_there_is_no_direction_the_derivative_is_zero() -> None:
 
 def test_what_makes_no_sense_is_refused() -> None:
     with pytest.raises(ValueError, match="finite"):
-        MOTION.move(np.zeros(8), UnicycleControl(math.nan, 0.0), 0.1)
+        MOTION.move(np.zeros(9), UnicycleControl(math.nan, 0.0), 0.1)

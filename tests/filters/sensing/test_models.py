@@ -23,7 +23,7 @@ from filters.sensing import (
     VelocityMeasurement,
 )
 
-NAMES = ("north", "east", "heading", "scale", "bias")
+NAMES = ("north", "east", "heading", "scale", "bias", "delay")
 Columns = Mapping[str, NDArray[np.float64]]
 COUNT = 2000
 
@@ -51,6 +51,16 @@ def position_density(
 ) -> Any:
     north, east = antenna(c, *lever)
     return stats.norm.pdf(z[0], north, sigmas[0]) * stats.norm.pdf(z[1], east, sigmas[1])
+
+
+def late_position_density(c: Columns, z: tuple[float, float], sigma: float, speed: float, rate: float) -> Any:
+    """Of an arc driven back for the delay: the chord of half the turn, exactly, has this length and direction."""
+    middle = c["heading"] - 0.5 * rate * c["delay"]
+    north, east = (
+        c["north"] - speed * c["delay"] * np.cos(middle),
+        c["east"] - speed * c["delay"] * np.sin(middle),
+    )
+    return stats.norm.pdf(z[0], north, sigma) * stats.norm.pdf(z[1], east, sigma)
 
 
 def velocity_density(c: Columns, z: tuple[float, float, float], sigma: float, scale: bool) -> Any:
@@ -126,6 +136,20 @@ CASES = {
         lambda c: velocity_density(c, (1.0, -0.5, -1.3), 0.7, scale=True),
         1 / 1600.0,
     ),
+    "position of an unknown delay": Case(
+        Position(1.5, delay="delay"),
+        PositionMeasurement(1.0, -2.0, 0.8, None, 4.0, 0.7),
+        lambda c: late_position_density(c, (1.0, -2.0), 0.8, 4.0, 0.7),
+        1e-6,
+    ),
+    "velocity of an unknown delay, scale": Case(
+        Velocity(0.4, span=40.0, scale="scale", delay="delay"),
+        VelocityMeasurement(1.0, -0.5, 1.3, 0.5, -0.9),
+        lambda c: velocity_density(
+            {**c, "heading": c["heading"] + 0.9 * c["delay"]}, (1.0, -0.5, 1.3), 0.5, scale=True
+        ),
+        1 / 1600.0,
+    ),
     "heading": Case(
         Heading(0.2),
         HeadingMeasurement(3.1),
@@ -152,6 +176,7 @@ def particles() -> ParticleSet:
         rng.uniform(-math.pi, math.pi, COUNT),
         rng.normal(1, 0.1, COUNT),
         rng.normal(0, 0.3, COUNT),
+        rng.normal(0.1, 0.2, COUNT),
     )
     return result
 
@@ -193,7 +218,7 @@ def test_the_outlier_part_bounds_the_loss(name: str, particles: ParticleSet) -> 
     assert (particles.log_weights + constant > math.log(case.sensor.outliers * case.outlier) - 1e-4).all()
 
 
-CENTRE = {"north": 3.0, "east": 4.0, "heading": math.pi / 2, "scale": 2.0, "bias": 0.5}
+CENTRE = {"north": 3.0, "east": 4.0, "heading": math.pi / 2, "scale": 2.0, "bias": 0.5, "delay": 0.2}
 
 
 @pytest.mark.parametrize(
@@ -203,7 +228,10 @@ CENTRE = {"north": 3.0, "east": 4.0, "heading": math.pi / 2, "scale": 2.0, "bias
         (Range(1.0, scale="scale", bias="bias"), RangeMeasurement(6.0, 3.0, 4.0, 2.0), 1.5),
         (Position(1.0), PositionMeasurement(0.0, 0.0), 5.0),
         (Position(1.0, lever=(1.0, 2.0)), PositionMeasurement(1.0, 5.0), 0.0),
+        (Position(1.0, delay="delay"), PositionMeasurement(3.0, 3.5, speed=2.5), 0.0),
+        (Position(1.0, delay="delay"), PositionMeasurement(3.5, 4.0, speed=2.5, yaw_rate=-5 * math.pi), 0.0),
         (Velocity(1.0), VelocityMeasurement(0.0, 3.0, 1.0), 2.0),
+        (Velocity(1.0, delay="delay"), VelocityMeasurement(1.0, 0.0, 1.0, None, 2.5 * math.pi), 0.0),
         (Velocity(1.0, scale="scale"), VelocityMeasurement(0.0, 3.0, 1.0), 1.0),
         (Heading(1.0), HeadingMeasurement(math.pi / 2 + 0.1 - 4 * math.pi), 0.1),
         (Heading(1.0, bias="bias"), HeadingMeasurement(math.pi / 2), -0.5),

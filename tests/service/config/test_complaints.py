@@ -171,11 +171,15 @@ SINGLE = [
     ("map.terrain", "tile.hgt", "map, terrain: is not in this version; leave it out"),
     ("publish.ros2_domain", 0, "publish, ros2_domain: is not in this version; leave it out"),
     ("publish.zenoh", "/no/z.json5", "publish, zenoh: needs a file that exists, there is no /no/z.json5"),
-    ("sensor.0.estimate", ["delay"], 'estimate: "delay" is not in this version, which has: scale, bias'),
+    (
+        "sensor.0.estimate",
+        ["delay"],
+        'sensor 1 (range), estimate: delay is estimated for positions and velocities only, and this is "range"',
+    ),
     (
         "sensor",
         [{"kind": "position", "estimate": ["bias"]}],
-        'sensor 1 (position), estimate: scale and bias are estimated for ranges only, and this is "position"',
+        'sensor 1 (position), estimate: bias is estimated for ranges only, and this is "position"',
     ),
     (
         "sensor",

@@ -1,0 +1,245 @@
+"""Measure whether what is claimed is observed, and what each mechanism is worth: ``make honesty`` (``SEEDS=5``).
+
+Every scenario and every recording that is there is run by the command that a user would type, and what it counted is
+kept in honesty.json: where a recording is absent, what was measured last stands. Of that are made the calibration
+curves (honesty-calibration.svg) and two tables of accuracy.md. ``--only NAME`` measures what holds that name,
+``--draw-only`` nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import accuracy
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+FOLDER = Path(__file__).parent
+KEPT = FOLDER / "honesty.json"
+PICTURE = FOLDER / "honesty-calibration.svg"
+CALIBRATION = ("<!-- calibration: begin -->", "<!-- calibration: end -->")
+ABLATION = ("<!-- ablation: begin -->", "<!-- ablation: end -->")
+SCENARIOS = ("beacons", "mirror", "kidnap", "late_fix", "spoof", "multipath", "slip", "jam", "outage")
+SWITCHES = ("hypotheses", "recovery", "trust", "motion_mode")
+MARGIN = 4.0
+"""Points by which observed may differ from claimed."""
+
+COLOURS = ("#2166ac", "#d95f02", "#1b7837", "#b2182b", "#7b3294", "#666666", "#008b8b", "#a6761d")
+DASHES = ("-", "--", ":")
+
+
+def told(arguments: list[str]) -> dict[str, Any] | None:
+    """Run ``beliefd`` and return the object that it prints; ``None``, and a line, where it failed."""
+    command = [str(Path(sys.executable).with_name("beliefd")), *arguments, "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=accuracy.ROOT)
+    if done.returncode != 0:
+        print(f"  beliefd {' '.join(arguments)}: {' '.join(done.stderr.split())[-200:]}", flush=True)
+        return None
+    return json.loads(done.stdout)
+
+
+def kept_of(said: dict[str, Any], command: list[str]) -> dict[str, Any]:
+    """Return what is kept of the runs of one command."""
+    summary = said["summary"]
+    levels = [run["levels"] for run in said["runs"] if run["levels"]]
+    names = ("rmse_m", "max_m", "nees_mean", "log_score", "coverage_50", "coverage_95", "coverage_99")
+    return {
+        "command": "beliefd " + " ".join(command),
+        "levels": np.sum(levels, axis=0).tolist() if levels else [],
+        "nees_bounds": summary["nees_bounds"],
+        "checks": {name: [one["passed"], one["of"]] for name, one in summary["checks"].items()},
+        **{name: summary[name] for name in names if name in summary},
+    }
+
+
+def wanted(seeds: int) -> Iterator[tuple[str, str, list[str]]]:
+    """Yield every measurement: which part of the file, its name there, the command."""
+    for name in SCENARIOS:
+        yield "scenarios", name, ["scenario", name, "--seeds", str(seeds)]
+    for row in accuracy.ROWS:
+        if row.command[0] == "replay" and all((accuracy.ROOT / path).is_file() for path in row.needs):
+            row.prepare()
+            yield "recordings", row.name, [*row.command, "--seeds", str(seeds)]
+    for switch in SWITCHES:
+        for name in SCENARIOS:
+            command = ["scenario", name, "--seeds", str(seeds), "--without", switch]
+            yield f"without {switch}", name, command
+
+
+def measure(kept: dict[str, Any], seeds: int, only: str, part_only: str) -> None:
+    """Run what is wanted, and write down each result as it comes."""
+    for part, name, command in wanted(seeds):
+        if only not in name or part_only not in part:
+            continue
+        print(f"{part}: {name}", flush=True)
+        said = told(command)
+        if said is not None:
+            kept.setdefault(part, {})[name] = kept_of(said, command)
+            KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+            write_page(kept)
+
+
+def curve(levels: list[int]) -> np.ndarray:
+    """Return the observed share at every claimed one: 0, 0.01 … 1; (101,)."""
+    counts = np.asarray(levels, float)
+    return np.concatenate([[0.0], np.cumsum(counts) / counts.sum()])
+
+
+def curves(kept: dict[str, Any], part: str) -> dict[str, np.ndarray]:
+    """Return the curves of a part, by name, of whatever had a truth."""
+    return {name: curve(one["levels"]) for name, one in kept.get(part, {}).items() if one["levels"]}
+
+
+def plain(name: str) -> str:
+    """Return a name without the marks of the page."""
+    return name.replace("`", "").split(",")[0] + (" (trimmed)" if "trimmed" in name else "")
+
+
+def panel(axis: Axes, of: dict[str, np.ndarray], title: str) -> None:
+    """Draw the curves of one part, and all of them together."""
+    claimed = np.linspace(0.0, 100.0, 101)
+    axis.fill_between(claimed, claimed - MARGIN, claimed + MARGIN, color="#d9d9d9", lw=0)
+    axis.plot(claimed, claimed, color="black", lw=0.6)
+    for index, (name, observed) in enumerate(of.items()):
+        dash = DASHES[index // len(COLOURS) % len(DASHES)]
+        axis.plot(
+            claimed, 100.0 * observed, dash, color=COLOURS[index % len(COLOURS)], lw=1.3, label=plain(name)
+        )
+    axis.set(xlim=(0, 100), ylim=(0, 100), title=title, xlabel="claimed to hold the truth, %", aspect="equal")
+    axis.set_xticks([0, 25, 50, 75, 95])
+    axis.set_yticks([0, 25, 50, 75, 95])
+    if of:
+        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2, fontsize=8, frameon=False)
+
+
+def draw(kept: dict[str, Any]) -> None:
+    """Draw the calibration curves: scenarios, recordings, and the mean of all."""
+    parts = {"simulated scenarios": curves(kept, "scenarios"), "recordings": curves(kept, "recordings")}
+    everything = [observed for of in parts.values() for observed in of.values()]
+    if not everything:
+        return
+    look = {"svg.hashsalt": "beliefd", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
+    with mpl.rc_context({**look, "axes.grid": True, "grid.color": "#e6e6e6", "axes.axisbelow": True}):
+        figure = Figure(figsize=(9.6, 5.0), layout="constrained")
+        axes = figure.subplots(1, 3)
+        for axis, (title, of) in zip(axes, parts.items(), strict=False):
+            panel(axis, of, title)
+        panel(axes[2], {f"mean of these {len(everything)}": np.mean(everything, axis=0)}, "all together")
+        axes[0].set_ylabel("observed to hold it, %")
+        figure.savefig(PICTURE, metadata={"Date": None})
+
+
+def percent(share: dict[str, float] | None) -> str:
+    """Return a share over the seeds in percent; a dash where there is none."""
+    return "–" if share is None else f"{100.0 * share['mean']:.1f} %"
+
+
+def calibration(kept: dict[str, Any]) -> str:
+    """Return the table of claimed and observed."""
+    head = ("", "50 %", "95 %", "99 %", "NEES", "its bounds", "log score", "RMSE, m", "checks", "command")
+    lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
+    every: list[np.ndarray] = []
+    for part in ("scenarios", "recordings"):
+        for name, one in kept.get(part, {}).items():
+            if not one["levels"]:
+                continue
+            observed = curve(one["levels"])
+            every.append(observed)
+            low, high = one["nees_bounds"]
+            cells = (
+                f"scenario `{name}`" if part == "scenarios" else name,
+                *(f"{100.0 * observed[level]:.1f} %" for level in (50, 95, 99)),
+                f"{one['nees_mean']['mean']:.2f}",
+                f"{low:.2f} … {high:.2f}",
+                f"{one['log_score']['mean']:.2f}",
+                f"{one['rmse_m']['mean']:.3f}",
+                passed(one),
+                f"`{one['command']}`",
+            )
+            lines.append(f"| {' | '.join(cells)} |")
+    if every:
+        mean = np.mean(every, axis=0)
+        cells = (
+            f"mean of these {len(every)}",
+            *(f"{100.0 * mean[level]:.1f} %" for level in (50, 95, 99)),
+            *("",) * 6,
+        )
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def passed(one: dict[str, Any]) -> str:
+    """Return how many of all checks of all seeds were passed; nothing where nothing is asked."""
+    if not one["checks"]:
+        return ""
+    counts = np.sum(list(one["checks"].values()), axis=0)
+    return f"{counts[0]} of {counts[1]}"
+
+
+def ablation(kept: dict[str, Any]) -> str:
+    """Return the table of what is left when one mechanism is switched off."""
+    head = ("scenario", "everything on", *(f"without {switch}" for switch in SWITCHES))
+    lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
+    for name in SCENARIOS:
+        parts = [kept.get(part, {}).get(name) for part in ("scenarios", *(f"without {s}" for s in SWITCHES))]
+        if any(one is not None for one in parts):
+            lines.append(f"| `{name}` | {' | '.join(worth(one) for one in parts)} |")
+    return "\n".join(lines)
+
+
+def worth(one: dict[str, Any] | None) -> str:
+    """Return one cell: checks passed, RMSE and worst error, share inside 95 %."""
+    if one is None or "rmse_m" not in one:
+        return "–"
+    figures = f"{metres(one['rmse_m']['mean'])}, {metres(one['max_m']['max'])}, {percent(one['coverage_95'])}"
+    return f"**{passed(one)}**; {figures}"
+
+
+def metres(value: float) -> str:
+    """Return metres with as many digits as they are worth."""
+    return f"{value:.2f} m" if value < 10.0 else f"{value:.0f} m"
+
+
+def between(text: str, markers: tuple[str, str], table: str) -> str:
+    """Return the page with what stands between two markers made anew."""
+    begin, end = markers
+    return f"{text.split(begin)[0]}{begin}\n{table}\n{end}{text.split(end)[1]}"
+
+
+def write_page(kept: dict[str, Any]) -> None:
+    """Write both tables into the page, and the picture beside it."""
+    text = accuracy.PAGE.read_text(encoding="utf-8")
+    text = between(text, CALIBRATION, calibration(kept))
+    text = between(text, ABLATION, ablation(kept))
+    accuracy.PAGE.write_text(text, encoding="utf-8")
+    draw(kept)
+
+
+def main() -> None:
+    """Run as a program."""
+    parser = argparse.ArgumentParser(
+        description="Draw the calibration and write its tables into accuracy.md."
+    )
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--only", default="", help="scenarios and recordings whose name holds this")
+    parser.add_argument(
+        "--part", default="", help="parts whose name holds this: scenarios, recordings, without"
+    )
+    parser.add_argument("--draw-only", action="store_true", help="measure nothing")
+    options = parser.parse_args()
+    kept: dict[str, Any] = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.is_file() else {}
+    if not options.draw_only:
+        measure(kept, options.seeds, options.only, options.part)
+    write_page(kept)
+
+
+if __name__ == "__main__":
+    main()
