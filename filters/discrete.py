@@ -20,6 +20,8 @@ from typing import Any, Generic, Protocol, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from filters.duration import require_duration
+
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 State = TypeVar("State", bound=Hashable)
@@ -169,8 +171,7 @@ def transition_over(rates: ArrayLike, duration: float) -> DenseTransition:
         raise ValueError(f"transition rates: a square matrix is needed, got shape {leaving.shape}")
     np.fill_diagonal(leaving, 0.0)
     _require_probabilities("transition rates", leaving)
-    if not 0.0 <= duration < math.inf:
-        raise ValueError(f"transition rates: duration must be finite and not negative, got {duration} s")
+    require_duration("transition rates", duration)
     fastest = float(leaving.sum(axis=1).max())
     events = fastest * duration
     squarings = max(0, math.ceil(math.log2(events))) if events > 1.0 else 0

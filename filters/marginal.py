@@ -31,6 +31,7 @@ from numpy.typing import ArrayLike
 
 from filters import resampling
 from filters.belief import Evidence
+from filters.duration import require_duration
 from filters.kalman import (
     LOG_TWO_PI,
     Matrix,
@@ -301,8 +302,7 @@ class MarginalFilter(Generic[Control]):
         ValueError
             A duration or control that is negative or not finite; nothing has moved then.
         """
-        if not 0.0 <= duration < math.inf:
-            raise ValueError(f"predict: duration must be finite and not negative, got {duration} s")
+        require_duration("predict", duration)
         step = self._motion.begin(control, duration)
         self._check_step(step)
         root, learning, gain = draw(self.covariance, step.coupling, step.noise)

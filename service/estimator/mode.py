@@ -57,6 +57,9 @@ creeps may stand; the gyro of one that drives straight does."""
 STRETCH = 0.2
 """Seconds of odometry that count as one independent reading."""
 
+SLIPPERY, GRIPPING = 0.5, 0.1
+"""Probability of slipping from which wheels are doubted, and below which those that slipped are believed again."""
+
 CERTAIN = 0.9
 """Probability from which the vehicle is treated as standing."""
 
@@ -99,23 +102,19 @@ class Mode:
         self._rolled = rolled
         self._bank = GaussianBank(motion, slow, 2)
         self._modes = DiscreteBayesFilter[MotionMode](_MODES, np.eye(3), (1 / 3, 1 / 3, 1 / 3))
+        self._slips = False
         self._bias = 0.0
         self._checked = 0
 
     @property
     def mode(self) -> MotionMode:
-        """The most likely one."""
-        return self._modes.most_likely
+        """The most likely one; slipping, until that has become unlikely."""
+        return MotionMode.SLIPPING if self._slips else self._modes.most_likely
 
     @property
     def still(self) -> float:
         """Probability of standing still."""
         return self._modes.probability(MotionMode.STILL)
-
-    @property
-    def slipping(self) -> float:
-        """Probability of slipping."""
-        return self._modes.probability(MotionMode.SLIPPING)
 
     @property
     def stands(self) -> bool:
@@ -124,9 +123,7 @@ class Mode:
 
     def doubt(self, distance: float, duration: float) -> float:
         """Return the variance (m²) by which a distance is to be doubted, over so many seconds."""
-        if self.mode is not MotionMode.SLIPPING or duration <= 0.0:
-            return 0.0
-        return _slip_variance(distance, duration)
+        return _slip_variance(distance, duration) if self._slips and duration > 0.0 else 0.0
 
     # --- before a move --------------------------------------------------------------------------------------------
 
@@ -135,6 +132,8 @@ class Mode:
         duration = (end - start) / SECOND
         if duration <= 0.0:
             return
+        slipping = self._modes.probability(MotionMode.SLIPPING)
+        self._slips = slipping >= (GRIPPING if self._slips else SLIPPERY)
         control = self._rolled(start, end)
         matrix = np.eye(3) + min(duration, 1.0) * GENERATOR  # exp(Q t) to first order: strides are short
         if self._bank.live.all():
