@@ -59,7 +59,7 @@ def fix(drive: Drive, t: float, sigma: float, off: float = 0.0) -> LocalPosition
 
 @pytest.mark.parametrize("scale", [1.0, 1.069])
 def test_from_anywhere_in_an_area(scale: float) -> None:
-    """Ranges that may read long, heading unknown, moving: in place within 6 s, and until then the region holds the truth."""
+    """Ranges that may read long, heading unknown, moving: in place in 6 s; until then the region holds the truth."""
     settings = configuration(**GLOBAL, sensor=[{"kind": "range", "sigma": 0.3, "estimate": ["scale"]}])
     for seed in range(2):
         samples = [_scaled(sample, scale) for sample in ranged_drive(seed, 12)]
