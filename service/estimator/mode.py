@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 
 from filters.belief import Evidence
-from filters.discrete import DenseTransition, DiscreteBayesFilter
+from filters.discrete import DiscreteBayesFilter
 from filters.kalman import Matrix
 from filters.linearised.bank import BATCHED, GaussianBank
 from filters.linearised.interacting import mix
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
+from filters.transition import DenseTransition
 from service.config import Configuration
 from service.estimate import MotionMode
 from service.estimator.ground import GroundVehicle
