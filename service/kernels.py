@@ -14,7 +14,8 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,6 +25,10 @@ _KEPT = 3
 
 _DAEMON = ("service.estimator",)
 """What the loop imports; its kernels come with it."""
+
+_NEEDLESS = ("scipy.linalg", "coverage")
+"""What numba imports if it is there, and no kernel uses: linear algebra, and a tool of its own developers. It takes a
+fifth of a start."""
 
 _KERNEL = re.compile(rb"(?m)^@(kernel|function)\b")
 _IMPORT = re.compile(r"(?m)^from (filters(?:\.\w+)*) import (\([^)]*\)|.*)")
@@ -171,11 +176,25 @@ def _every_module() -> Sequence[str]:
     return every_module()
 
 
+@contextmanager
+def _without(names: Sequence[str]) -> Generator[None]:
+    """Have an import of these packages fail, unless they are there already."""
+    hidden = [name for name in names if name not in sys.modules]
+    sys.modules.update(dict.fromkeys(hidden))  # pyright: ignore[reportCallIssue, reportArgumentType]
+    try:
+        yield
+    finally:
+        for name in hidden:
+            if sys.modules.get(name) is None:
+                sys.modules.pop(name, None)
+
+
 def _warm(modules: Callable[[], Sequence[str]], progress: Progress) -> Path:
     folder = prepare()
-    from filters.kernels import compile_all
+    with _without(_NEEDLESS):
+        from filters.kernels import compile_all
 
-    compile_all(modules(), progress)
+        compile_all(modules(), progress)
     os.utime(folder)
     _prune(folder)
     return folder

@@ -100,7 +100,9 @@ def _leave(_signal: int, _frame: object) -> None:
 def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
     gc.disable()  # until it is frozen: looking for garbage among a compiler's modules is a tenth of the start
     heart = Heart(inherited(arguments.heart))
-    kernels.warm(lambda name, done, count: heart.announce(f"compiling kernels, {done} of {count}: {name}"))
+    cache = kernels.warm(
+        lambda name, done, count: heart.announce(f"compiling kernels, {done} of {count}: {name}")
+    )
 
     from service.budget import Meters
     from service.checkpoint import Checkpoints
@@ -109,10 +111,10 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
     from service.inlet import Inlet
     from service.loop import Loop
     from service.orders import Orders
-    from service.rehearsal import rehearse
+    from service.shapes import shapes_of
 
     heart.announce("rehearsing")
-    shapes = rehearse(configuration)
+    shapes = shapes_of(configuration, cache)
     meters = Meters(configuration.loop.rate)
     for refusal in punctual(configuration.loop.priority, configuration.loop.cpus):
         _log.warning("loop: %s", refusal)

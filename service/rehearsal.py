@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from statistics import median
+from typing import NamedTuple
 
 import msgspec
 
@@ -40,9 +41,17 @@ PARTICLE_STAGES = ("motion", "sensing", "resampling", "extraction")
 MANY = 20_000
 """Particles of the large rehearsal, where the configuration allows so many."""
 
-_TICKS = 50
-_WARM = 20
-_PERIOD_NS = 20_000_000
+
+class Pace(NamedTuple):
+    """So many ticks, nanoseconds apart, of which the first do not count."""
+
+    ticks: int
+    period: int
+    warm: int
+
+
+STEADY = Pace(50, 20_000_000, 20)
+_BRIEF = Pace(12, 100_000_000, 12)
 _SPEED = 1.0
 _FEW = 4
 _LEAST = 1e-11
@@ -72,6 +81,13 @@ def deputy(configuration: Configuration) -> dict[str, Shape]:
     return {KALMAN: line(1, one[KALMAN], measurements, all_of_them[KALMAN])} if one[KALMAN] > 0.0 else {}
 
 
+def touch(configuration: Configuration) -> None:
+    """Run a few ticks of each kind, so that each kernel, import and page has been used once; nothing is measured."""
+    few = configuration.budget.particles_min
+    for rung in (WHOLE, Rung(Level.KALMAN, WHOLE.most)):
+        costs(configuration, few, rung, _BRIEF)
+
+
 def line(few: int, cheap: float, many: int, dear: float) -> Shape:
     """Return the line through two points, or the nearest that neither falls nor starts below zero."""
     if many == few:
@@ -80,9 +96,11 @@ def line(few: int, cheap: float, many: int, dear: float) -> Shape:
     return Shape(max(dear - slope * many, 0.0), slope)
 
 
-def costs(configuration: Configuration, count: int, rung: Rung = WHOLE) -> dict[str, float]:
+def costs(
+    configuration: Configuration, count: int, rung: Rung = WHOLE, pace: Pace = STEADY
+) -> dict[str, float]:
     """Return the median cost of every stage at ``count`` particles, seconds, over the ticks in which it ran."""
-    meters = Meters(_TICKS)
+    meters = Meters(pace.ticks)
     start = Start(mode="given", position=(0.0, 0.0, 0.0), heading=0.0, sigma_heading=0.1)
     budget = configuration.budget.model_copy(update={"particles_min": count, "particles_max": count})
     estimator = Estimator(configuration.model_copy(update={"start": start, "budget": budget}), meters)
@@ -90,8 +108,8 @@ def costs(configuration: Configuration, count: int, rung: Rung = WHOLE) -> dict[
     seconds: dict[str, list[float]] = {stage: [] for stage in (*PARTICLE_STAGES, KALMAN)}
     course = Course()
     now = 0
-    for tick in range(_TICKS):
-        now = 1_000_000_000 + tick * _PERIOD_NS
+    for tick in range(pace.ticks):
+        now = 1_000_000_000 + tick * pace.period
         meters.begin()
         datagram = decode(encode(SampleBatch(list(_samples(configuration, now)))))
         if isinstance(datagram, SampleBatch):
@@ -101,7 +119,7 @@ def costs(configuration: Configuration, count: int, rung: Rung = WHOLE) -> dict[
         encoder.encode(estimator.tick(now, now, count, course))
         meters.end(0.0, 0.0)
         for stage, costs in seconds.items():
-            if tick >= _WARM and meters.costs[stage] > 0.0:
+            if tick >= pace.warm and meters.costs[stage] > 0.0:
                 costs.append(meters.costs[stage])
     encoder.encode(estimator.sensors(now))
     estimator.cloud(configuration.publish.particles)

@@ -1,0 +1,72 @@
+"""What the stages of a tick cost on this machine, measured once and kept beside the compiled kernels.
+
+A rehearsal takes longer than all else of a start. So its result is kept, in a file for each configuration, in a folder
+for each version of the kernels and processor. The next start only touches what a tick needs. That the machine was busy
+when it was measured does not matter: the governor learns the costs in operation as multiples of these.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+from math import isfinite
+from pathlib import Path
+
+import msgspec
+
+from service.config import Configuration
+from service.governor import Shape
+from service.rehearsal import rehearse, touch
+
+_KEPT = 16
+"""Files that a folder keeps: the newest."""
+
+_log = logging.getLogger(__name__)
+
+
+def shapes_of(configuration: Configuration, folder: Path) -> dict[str, Shape]:
+    """Return the shapes that ``folder`` has for ``configuration``, or measure and keep them.
+
+    Either way every kernel, import and page that a tick needs has been used once.
+    """
+    path = folder / f"shapes-{_digest(configuration)}.json"
+    kept = _read(path)
+    if kept:
+        touch(configuration)
+        return kept
+    shapes = rehearse(configuration)
+    _keep(path, shapes)
+    return shapes
+
+
+def _digest(configuration: Configuration) -> str:
+    return hashlib.sha256(configuration.model_dump_json().encode()).hexdigest()[:12]
+
+
+def _read(path: Path) -> dict[str, Shape]:
+    """Return what a file says; nothing if there is none, or none that can be believed."""
+    try:
+        shapes = msgspec.json.decode(path.read_bytes(), type=dict[str, Shape])
+    except (OSError, msgspec.DecodeError):
+        return {}
+    whole = all(
+        isfinite(shape.at(1)) and shape.overhead >= 0.0 and shape.per_particle > 0.0
+        for shape in shapes.values()
+    )
+    return shapes if whole else {}
+
+
+def _keep(path: Path, shapes: dict[str, Shape]) -> None:
+    """Write a file at once or not at all, and remove the oldest; without it the next start measures again."""
+    part = path.with_suffix(f".{os.getpid()}")
+    try:
+        part.write_bytes(msgspec.json.encode(shapes))
+        part.replace(path)
+        newest = sorted(
+            path.parent.glob("shapes-*.json"), key=lambda found: found.stat().st_mtime, reverse=True
+        )
+        for stale in newest[_KEPT:]:
+            stale.unlink(missing_ok=True)
+    except OSError as error:
+        _log.warning("loop: what the rehearsal measured is not kept: %s", error)
