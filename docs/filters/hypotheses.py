@@ -90,8 +90,8 @@ def shapes() -> Figure:
         for _ in range(3):
             hypotheses.look(columns, np.ones(4000, np.float32), 4000)
         for label in sorted(hypotheses.names):
-            own = columns[:, hypotheses.labels == label][:, ::12]
-            ax.plot(own[1], own[0], ".", ms=1.5, color=COLOURS[label % len(COLOURS)])
+            own = columns[:, hypotheses.labels == label][:, ::32]
+            ax.plot(own[1], own[0], ".", ms=2.0, color=COLOURS[label % len(COLOURS)])
         mixture = KMeans()(columns[:2].T)
         ax.set_title(f"{title}: {hypotheses.count}\nk-means: {len(mixture.components)}", fontsize=9)
         ax.set(aspect="equal", xticks=[], yticks=[])
