@@ -62,7 +62,7 @@ def kalman(axes: int, position: float, velocity: float) -> KalmanFilter:
 
 def test_a_kalman_filter_over_position_and_velocity_agrees() -> None:
     """The problem is linear and Gaussian. Over 40,000 particles the means agree to 0.06 standard deviations and the
-    covariances to 8 %: five of the standard errors seen over 20 other seeds."""
+    covariances to 8 %; the worst of 12 other seeds were 0.04 and 4.1 %."""
     q, count, sigma, t = 0.9, 40_000, 0.5, 0.25
     belief = ParticleFilter(ConstantVelocity(q, 2.0), capacity=count, seed=5)
     rng = np.random.default_rng(6)

@@ -88,8 +88,8 @@ def test_on_a_known_path_the_bias_is_a_kalman_filters() -> None:
 
 
 def test_beside_an_unknown_place_the_bias_is_a_kalman_filters() -> None:
-    """Two beacons 2 km off on one line: linear to 1 mm. 40,000 particles; means to 0.05 standard deviations and
-    covariances to 8 %, five standard errors as seen over 20 other seeds."""
+    """Two beacons 2 km off on one line: linear to 1 mm. 40,000 particles; means to 0.05 standard deviations,
+    covariances to 8 %."""
     count = 40_000
     names = ("north", "bias/1", "bias/2")
     belief = filter_of(count, [Learned("bias/1", 0.0, 0.5), Learned("bias/2", 0.0, 0.2)])

@@ -199,6 +199,15 @@ def test_each_error_says_where_what_and_what_would_be_right(place: str, value: o
     assert expected in found[0]
 
 
+@pytest.mark.parametrize("kind", ["heading", "velocity"])
+def test_a_tag_has_no_heading_to_measure(kind: str) -> None:
+    tag = placed(whole(), "vehicle.motion", "constant_velocity")
+    assert complaints(placed(tag, "sensor", [{"kind": "position"}, {"kind": "range"}])) == []
+    found = complaints(placed(tag, "sensor", [{"kind": "range"}, {"kind": kind}]))
+    assert len(found) == 1
+    assert f'sensor 2 ({kind}), kind: "{kind}" needs a heading' in found[0]
+
+
 def test_the_whole_file_has_no_error() -> None:
     assert validated(whole(), Configuration, "robot.toml").beacon[0].id == 7
 
