@@ -4,38 +4,20 @@
     python benchmarks/deadline.py --matrix [--rates 50,100,200] [--seconds 30]           all loads, a table
 
 Loads: ``idle`` (a calm link of 400 messages/s), ``stress`` (the same beside ``stress-ng --cpu 4 --vm 1``), ``link``
-(FLOOD messages/s), ``stopped`` (a subscriber that is stopped with SIGSTOP). One sender process paces frames that
-were packed beforehand (stamps and sums are patched in place); a Zenoh subscriber reads what the daemon says
-of itself. Printed: missed ticks, lateness, use of the budget, drops, level and count over time, memory of every
-process, and the time from the start of the daemon to its first estimate. ``--matrix`` writes docs/performance.md.
+(FLOOD messages/s), ``stopped`` (a subscriber that is stopped with SIGSTOP). One process sends (traffic.py); a Zenoh
+subscriber reads what the daemon says of itself (observation.py). Printed: missed ticks, lateness, use of the budget,
+drops, level and count over time, memory of every process, and the time from the start of the daemon to its first
+estimate. ``--matrix`` writes docs/performance.md.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
-import json
-import os
-import shutil
-import signal
-import socket
-import struct
-import subprocess
-import sys
-import tempfile
-import time
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
-import zenoh
+from observation import Outcome, run
 from report import machine, write
 
-from service.estimate import Budget, Estimate, Sensors, Status
-
-ROOT = Path(__file__).parents[1]
 LOADS = ("idle", "stress", "link", "stopped")
 ORDINARY = ("idle", "stress")
 """Loads that the matrix also measures without SCHED_FIFO."""
@@ -43,58 +25,13 @@ ORDINARY = ("idle", "stress")
 CALM = 400
 """Messages per second of the vehicle where the link is not the load."""
 
-SETTLED = 5
-"""Seconds after which page faults count."""
-BEACONS = {0: (20.0, 10.0), 1: (-5.0, 20.0), 2: (30.0, -15.0), 3: (-20.0, -10.0)}
-SPEED = 1.0
-UNKNOWN = 2**31 - 1
-CONFIGURATION = """
-[vehicle]
-name = "rover"
-[start]
-position = [0.0, 0.0, 0.0]
-heading = 0.0
-[loop]
-rate = {rate}
-priority = {priority}
-[budget]
-cpu_ms = {budget}
-[[link]]
-name = "autopilot"
-kind = "mavlink"
-url = "udpin:127.0.0.1:{port}"
-[[sensor]]
-kind = "range"
-sigma = 0.3
-{beacons}
-[publish]
-zenoh = "{zenoh}"
-[state]
-directory = "{folder}"
-"""
-
-
-class Outcome(NamedTuple):
-    """What one run came to."""
-
-    last: Budget
-    counts: list[int]
-    faults: float
-
 
 def main() -> None:
     arguments = parse()
-    if arguments.send_to:
-        send(arguments.send_to, arguments.flood, arguments.seconds)
-    elif arguments.matrix:
+    if arguments.matrix:
         matrix(arguments)
     else:
         run(arguments)
-
-
-def run(arguments: argparse.Namespace) -> Outcome:
-    with tempfile.TemporaryDirectory(prefix="beliefd-deadline-") as folder:
-        return measure(arguments, Path(folder))
 
 
 def matrix(arguments: argparse.Namespace) -> None:
@@ -147,307 +84,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--loads", default=",".join(LOADS), help="of the matrix")
     parser.add_argument("--priorities", default="10,0", help="of the matrix: SCHED_FIFO, 0: ordinary")
     parser.add_argument("--rates", default="50,100,200", help="of the matrix")
-    parser.add_argument("--send-to", type=int, default=0, help=argparse.SUPPRESS)
     return parser.parse_args()
-
-
-# --- the vehicle ------------------------------------------------------------------------------------
-
-
-def send(port: int, rate: int, seconds: float) -> None:
-    """Send ``rate`` frames a second: a fifth wheels, a fifth gyro, a tenth ranges, the rest attitude."""
-    os.environ["MAVLINK20"] = "1"
-    os.environ["MAVLINK_DIALECT"] = "all"
-    from pymavlink.dialects.v20 import all as dialect
-
-    mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
-    end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    end.connect(("127.0.0.1", port))
-    burst = max(1, rate // 500)
-    began, sent = time.monotonic(), 0
-    while sent < rate * seconds:
-        time.sleep(max(0.0, began + sent / rate - time.monotonic()))
-        for _ in range(burst):
-            with contextlib.suppress(ConnectionRefusedError):
-                end.send(frame(dialect, mav, sent, sent / rate))
-            sent += 1
-    print(json.dumps({"sent": sent, "seconds": time.monotonic() - began}), flush=True)
-
-
-_PACKED: dict[str, bytes] = {}
-
-
-def frame(dialect: Any, mav: Any, number: int, elapsed: float) -> bytes:
-    """Return one frame, packed beforehand, with its sequence, stamp and check sum of now."""
-    if number % 2000 == 0:
-        return mav.heartbeat_encode(10, 3, 0, 0, 4).pack(mav)
-    stamp = int((elapsed + 100.0) * 1e6)
-    turn = number % 10
-    north = SPEED * elapsed
-    if turn in (0, 5):
-        return patched(dialect, mav, "wheels", struct.pack("<Qdd", stamp, north, north), number)
-    if turn in (1, 6):
-        return patched(dialect, mav, "imu", struct.pack("<Q", stamp), number)
-    if turn == 2:
-        beacon = number // 10 % len(BEACONS)
-        distance = round(1000 * float(np.hypot(north - BEACONS[beacon][0], BEACONS[beacon][1])))
-        return mav.ranging_beacon_encode(
-            stamp, 0, 0, beacon, distance, UNKNOWN, UNKNOWN, float("nan"), 0, 0, 0, 0, 300, number % 256, 0
-        ).pack(mav)
-    return patched(dialect, mav, "attitude", struct.pack("<I", stamp // 1000), number)
-
-
-def patched(dialect: Any, mav: Any, kind: str, head: bytes, number: int) -> bytes:
-    """Write ``head`` over the start of a packed payload, and correct sequence and check sum."""
-    if kind not in _PACKED:
-        full = (1.0,) * 16
-        _PACKED[kind] = {
-            "wheels": lambda: mav.wheel_distance_encode(2**40, 2, full),
-            "imu": lambda: mav.highres_imu_encode(
-                2**40, 0, 0, -9.81, 0, 0, 1e-9, 0.2, 0, 0.4, 1013.0, 0, 0, 20.0, 63, 0
-            ),
-            "attitude": lambda: mav.attitude_encode(2**30, 0, 0, 0, 0, 0, 1e-9),
-        }[kind]().pack(mav)
-    packed = bytearray(_PACKED[kind])
-    packed[4] = number & 0xFF
-    packed[10 : 10 + len(head)] = head
-    extra = {
-        "wheels": dialect.MAVLink_wheel_distance_message.crc_extra,
-        "imu": dialect.MAVLink_highres_imu_message.crc_extra,
-        "attitude": dialect.MAVLink_attitude_message.crc_extra,
-    }[kind]
-    total = dialect.x25crc(packed[1:-2])
-    total.accumulate(bytes([extra]))
-    packed[-2:] = struct.pack("<H", total.crc)
-    return bytes(packed)
-
-
-# --- the observer -----------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def loaded(load: str, endpoint: str) -> Iterator[None]:
-    """Have the load beside the daemon for as long as this lasts."""
-    if load == "stress":
-        others = subprocess.Popen(
-            stress(), stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-    elif load == "stopped":
-        others = subprocess.Popen(
-            [sys.executable, "-c", SUBSCRIBER, endpoint], stdout=subprocess.PIPE, text=True
-        )
-        assert others.stdout is not None
-        others.stdout.readline()
-        others.send_signal(signal.SIGSTOP)
-    else:
-        yield
-        return
-    try:
-        yield
-    finally:
-        others.send_signal(signal.SIGCONT)
-        if others.stdin is not None:
-            others.stdin.close()
-        others.terminate()
-        others.wait()
-
-
-def stress() -> list[str]:
-    """Return the command of the load: stress-ng, or where that is absent four processes that only count."""
-    if shutil.which("stress-ng"):
-        return ["stress-ng", "--cpu", "4", "--vm", "1", "--timeout", "0"]
-    print("no stress-ng here: four processes that only count, in its place")
-    return [sys.executable, "-c", SPINNERS]
-
-
-SPINNERS = """
-import signal, subprocess, sys
-signal.signal(signal.SIGTERM, signal.SIG_IGN)
-spinners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(4)]
-try:
-    sys.stdin.read()
-finally:
-    for spinner in spinners:
-        spinner.kill()
-"""
-SUBSCRIBER = """
-import json, sys, time, zenoh
-settings = zenoh.Config()
-settings.insert_json5("mode", '"client"')
-settings.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
-settings.insert_json5("scouting/multicast/enabled", "false")
-session = zenoh.open(settings)
-subscriber = session.declare_subscriber("beliefd/v1/rover/**")
-subscriber.recv()
-print("heard", flush=True)
-while True:
-    subscriber.recv()
-"""
-
-
-def measure(arguments: argparse.Namespace, folder: Path) -> Outcome:
-    port, zenoh_port = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_STREAM)
-    endpoint = f"tcp/127.0.0.1:{zenoh_port}"
-    file = configure(arguments, folder, port, endpoint)
-    began = time.monotonic()
-    with (folder / "log").open("wb") as log:
-        daemon = subprocess.Popen(
-            [sys.executable, "-c", "from service.cli import main; main()", "run", str(file)],
-            cwd=ROOT,
-            stderr=log,
-        )
-    try:
-        with open_client(endpoint) as session:
-            return observe(arguments, session, daemon, began, port, endpoint)
-    finally:
-        daemon.send_signal(signal.SIGTERM)
-        daemon.wait()
-        print((folder / "log").read_text())
-
-
-def observe(
-    arguments: argparse.Namespace,
-    session: Any,
-    daemon: subprocess.Popen[bytes],
-    began: float,
-    port: int,
-    endpoint: str,
-) -> Outcome:
-    estimates = session.declare_subscriber("beliefd/v1/rover/estimate", zenoh.handlers.RingChannel(4096))
-    states = session.declare_subscriber("beliefd/v1/rover/*", zenoh.handlers.RingChannel(4096))
-    first = first_estimate(estimates)
-    print(f"start of the daemon to its first estimate: {first.monotonic_ns * 1e-9 - began:.2f} s")
-    command = [sys.executable, str(Path(__file__)), "--send-to", str(port)]
-    command += ["--flood", str(arguments.flood), "--seconds", str(arguments.seconds)]
-    budgets: list[Budget] = []
-    links: Sensors | None = None
-    heard: list[Estimate] = [first]
-    with loaded(arguments.load, endpoint):
-        sender = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
-        while sender.poll() is None:
-            heard += [msgspec.json.decode(p, type=Estimate) for _, p in drained(estimates)]
-            for key, payload in drained(states):
-                if key.endswith("/budget"):
-                    budgets.append(msgspec.json.decode(payload, type=Budget))
-                elif key.endswith("/sensors"):
-                    links = msgspec.json.decode(payload, type=Sensors)
-            time.sleep(0.02)
-    assert sender.stdout is not None
-    print("sender:", sender.stdout.read().strip())
-    report(heard, budgets, links)
-    over_time(budgets)
-    memory(session, daemon.pid)
-    settled = budgets[SETTLED:]
-    ticks = settled[-1].ticks - settled[0].ticks if len(settled) > 1 else 0
-    faults = 1e3 * sum(budget.page_faults for budget in settled[1:]) / max(1, ticks)
-    print(f"page faults per 1,000 ticks after {SETTLED} s: {faults:.1f}")
-    return Outcome(budgets[-1], [estimate.particles for estimate in heard if estimate.particles], faults)
-
-
-def over_time(budgets: list[Budget]) -> None:
-    """Print at most twenty lines: what was demanded, afforded and used, and what was given up."""
-    print("   s  demanded afforded     used level  missed  why")
-    for budget in budgets[:: max(1, len(budgets) // 20)]:
-        elapsed = budget.time - budgets[0].time
-        print(f"{elapsed:4.0f} {budget.demanded:9} {budget.afforded:8} {budget.particles:8} {budget.level:5} "
-              f"{budget.missed_ticks:7}  {budget.level_reason}")  # fmt: skip
-
-
-def report(heard: list[Estimate], budgets: list[Budget], links: Sensors | None) -> None:
-    last = budgets[-1]
-    lateness = np.array([budget.lateness.worst for budget in budgets])
-    use = np.array([budget.use for budget in budgets])
-    counts = np.array([estimate.particles for estimate in heard if estimate.particles])
-    gaps = np.diff([estimate.sequence for estimate in heard])
-    ages = np.diff([estimate.monotonic_ns for estimate in heard]) * 1e-6
-    print(f"ticks {last.ticks}, missed {last.missed_ticks}, over the budget {last.overruns}")
-    print(f"lateness, worst of each second, ms: median {np.median(lateness):.3f}, worst {lateness.max():.3f}")
-    medians, p99s = ([getattr(b.lateness, name) for b in budgets] for name in ("median", "p99"))
-    print(f"lateness, ms: median of medians {np.median(medians):.3f}, median of 99 % {np.median(p99s):.3f}")
-    print(f"budget use: median {np.median(use):.3f}, largest second {use.max():.3f} of {last.budget_ms} ms")
-    print("stages of the last second, median / 99 % / worst, ms:")
-    for stage, cost in last.stages.items():
-        print(f"  {stage:12} {cost.median:7.3f} {cost.p99:7.3f} {cost.worst:7.3f}")
-    if len(counts):
-        print(f"particles: mean {counts.mean():.0f}, most {counts.max()}; demanded {last.demanded}, "
-              f"afforded {last.afforded}, level {last.level}")  # fmt: skip
-    print(f"estimates received {len(heard)}, lost on the way {int((gaps - 1).sum())}; ms between them: "
-          f"99 % {np.percentile(ages, 99):.2f}, worst {ages.max():.2f}")  # fmt: skip
-    print("drops:", last.drops)
-    for link in links.links if links else []:
-        print(f"link {link.name}: {link.messages} messages, {link.samples} samples, dropped {link.dropped}, "
-              f"ignored {link.ignored}, malformed {link.malformed}")  # fmt: skip
-
-
-def memory(session: Any, supervisor: int) -> None:
-    reply = next(iter(session.get("beliefd/v1/rover/@rpc/status", timeout=5.0)))
-    status = msgspec.json.decode(reply.ok.payload.to_bytes(), type=Status)
-    total = 0.0
-    print("memory, MB (resident, proportional):")
-    for process in status.processes:
-        rolled = dict(smaps(process.pid)) if process.pid else {}
-        total += rolled.get("Pss", 0.0)
-        print(f"  {process.name:20} {rolled.get('Rss', 0.0):7.1f} {rolled.get('Pss', 0.0):7.1f}"
-              f"   restarts {process.restarts}")  # fmt: skip
-    print(f"  {'all':20} {'':7} {total:7.1f}")
-
-
-def smaps(pid: int) -> Iterator[tuple[str, float]]:
-    for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:]:
-        name, _, rest = line.partition(":")
-        yield name, int(rest.split()[0]) / 1024
-
-
-def drained(subscriber: Any) -> Iterator[tuple[str, bytes]]:
-    while (value := subscriber.try_recv()) is not None:
-        yield str(value.key_expr), value.payload.to_bytes()
-
-
-def first_estimate(subscriber: Any) -> Estimate:
-    until = time.monotonic() + 180.0
-    while time.monotonic() < until:
-        for _, payload in drained(subscriber):
-            return msgspec.json.decode(payload, type=Estimate)
-        time.sleep(0.002)
-    raise SystemExit("no estimate within 180 s")
-
-
-def open_client(endpoint: str) -> Any:
-    configuration = zenoh.Config()
-    configuration.insert_json5("mode", '"client"')
-    configuration.insert_json5("connect/endpoints", json.dumps([endpoint]))
-    configuration.insert_json5("connect/timeout_ms", "60000")
-    configuration.insert_json5("connect/retry", '{"period_init_ms": 50, "period_max_ms": 100}')
-    configuration.insert_json5("scouting/multicast/enabled", "false")
-    return zenoh.open(configuration)
-
-
-def configure(arguments: argparse.Namespace, folder: Path, port: int, endpoint: str) -> Path:
-    session = {
-        "mode": "peer",
-        "listen": {"endpoints": [endpoint]},
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "transport": {"shared_memory": {"enabled": False}},
-    }
-    (folder / "zenoh.json5").write_text(json.dumps(session))
-    beacons = "".join(
-        f"[[beacon]]\nid = {beacon}\nposition = [{north}, {east}, 0.0]\n"
-        for beacon, (north, east) in BEACONS.items()
-    )
-    file = folder / "rover.toml"
-    file.write_text(
-        CONFIGURATION.format(
-            rate=arguments.rate, priority=arguments.priority, budget=arguments.budget, port=port,
-            beacons=beacons, zenoh=folder / "zenoh.json5", folder=folder,
-        )
-    )  # fmt: skip
-    return file
-
-
-def free_port(kind: socket.SocketKind) -> int:
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 if __name__ == "__main__":
