@@ -29,6 +29,14 @@ class HealthState(StrEnum):
     STARVED = "starved"
 
 
+class MotionMode(StrEnum):
+    """How a vehicle moves: it stands, it moves as its wheels say, or its wheels slip."""
+
+    STILL = "still"
+    MOVING = "moving"
+    SLIPPING = "slipping"
+
+
 class Estimate(msgspec.Struct, frozen=True, gc=False):
     """The belief at one tick, predicted to the tick's own time.
 
@@ -75,6 +83,8 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
         Slow states: name to value and sigma.
     level_reason : str
         What this tick gave up, and for what; empty at level 0.
+    mode : MotionMode or None
+        How the vehicle moves; ``null`` where that is not estimated.
     """
 
     sequence: int
@@ -101,6 +111,7 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
     reset_counter: int
     biases: dict[str, tuple[float, float]]
     level_reason: str = ""
+    mode: MotionMode | None = None
 
 
 class Hypothesis(msgspec.Struct, frozen=True, gc=False):
@@ -465,9 +476,77 @@ class Cloud(msgspec.Struct, frozen=True, gc=False):
     columns: tuple[str, str, str, str] = ("north", "east", "heading", "weight")
 
 
+class Component(msgspec.Struct, frozen=True, gc=False):
+    """One Gaussian of a mixture.
+
+    Attributes
+    ----------
+    weight : float
+        They sum to one.
+    mean : list[float]
+        Of the density's columns.
+    covariance : list[list[float]]
+        Its own.
+    """
+
+    weight: float
+    mean: list[float]
+    covariance: list[list[float]]
+
+
+class Cell(msgspec.Struct, frozen=True, gc=False):
+    """A box and the probability in it.
+
+    Attributes
+    ----------
+    north, east : tuple[float, float]
+        From and to, m.
+    mass : float
+        Over its area, the density in it.
+    """
+
+    north: tuple[float, float]
+    east: tuple[float, float]
+    mass: float
+
+
+class Density(msgspec.Struct, frozen=True, gc=False):
+    """The answer to ``@rpc/density``: a density of the last cloud of particles.
+
+    Attributes
+    ----------
+    extractor : str
+        ``gaussian``, ``kmeans``, ``histogram``, ``tree`` or ``kernel``.
+    time : float
+        Of the cloud, Unix seconds.
+    particles : int
+        Of how many.
+    columns : list[str]
+        The density's dimensions: north, east and heading, or north and east.
+    mean, covariance : list[float], list[list[float]]
+        Of the density, in their order; m and rad.
+    components : list[Component] or None
+        Of ``kmeans``: the mixture.
+    cells : list[Cell] or None
+        Of ``histogram`` and ``tree`` all that hold anything; of ``kernel`` a grid, its density at their middles.
+    bandwidth : list[float] or None
+        Of ``kernel``: north and east, m.
+    """
+
+    extractor: str
+    time: float
+    particles: int
+    columns: list[str]
+    mean: list[float]
+    covariance: list[list[float]]
+    components: list[Component] | None = None
+    cells: list[Cell] | None = None
+    bandwidth: list[float] | None = None
+
+
 def schema() -> dict[str, object]:
     """Return the JSON Schema of every value on the wire, by name (what ``@rpc/schema`` answers)."""
-    values = (Estimate, Hypotheses, Budget, Sensors, Health, Status, Cloud)
+    values = (Estimate, Hypotheses, Budget, Sensors, Health, Status, Cloud, Density)
     schemas, components = msgspec.json.schema_components(values, ref_template="#/$defs/{name}")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

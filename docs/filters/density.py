@@ -15,45 +15,7 @@ from filters.density.binned import BinnedKernels
 from filters.density.k_means import KMeans
 from filters.density.kernel import Kernels
 from filters.density.normal import gaussian
-from filters.textbook.extraction import extraction
 from service.textbook.style import BLUE, GREEN, GREY, ORANGE, RED
-
-
-def figure_4_5() -> Figure:
-    """One particle set as each of the densities."""
-    shown = extraction(500, points=301)
-    figure, axes = plt.subplots(2, 3, figsize=(8.6, 5.0), sharex=True, sharey=True, layout="constrained")
-    titles = {
-        "particles": "exact density",
-        "gaussian": "Gaussian",
-        "histogram": "histogram",
-        "kernel": "kernel density",
-        "mixture": "k-means mixture",
-        "tree": "density tree",
-    }
-    for axis, (name, title) in zip(axes.flat, titles.items(), strict=True):
-        axis.fill_between(shown.y, shown.exact, color=GREY, alpha=0.25, linewidth=0)
-        axis.plot(
-            shown.particles,
-            np.full(shown.particles.size, -0.035),
-            "|",
-            color=BLUE,
-            alpha=0.3,
-            markersize=6,
-            rasterized=True,
-        )
-        kept = f"{shown.particles.size} particles"
-        if name != "particles":
-            axis.plot(shown.y, shown.densities[name], color=RED, linewidth=1.3)
-            kept = f"{shown.numbers[name]} numbers, {100 * shown.error[name]:.0f} % misplaced"
-        if name == "gaussian":
-            axis.plot(shown.y, shown.exact_gaussian, "--", color="black", linewidth=1)
-        axis.set_title(f"{title}\n{kept}", fontsize=9)
-    for axis in axes[1]:
-        axis.set_xlabel("state y")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("density, 1 / unit of y")
-    return figure
 
 
 def two_places() -> NDArray[np.float64]:

@@ -27,6 +27,7 @@ from service.estimator.course import CROWD, Cause, Course, Level
 from service.estimator.fusion import Fusion
 from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
+from service.estimator.mode import mode_of
 from service.estimator.output import Output
 from service.estimator.population import Population
 from service.estimator.resuming import begin_again, kept_of
@@ -89,6 +90,11 @@ class Estimator:
         self._search = Search(configuration, self._vehicle, self._filter.names, seed)
         self._fusion.search = self._search
         self._fusion.companions.append(self._search)
+        self._mode = mode_of(configuration, self._vehicle, self._filter)
+        if self._mode is not None:
+            mode = self._mode
+            self._population.still = lambda: mode.still
+            self._fusion.companions.append(mode)
         self._trust = trust_of(configuration, self._vehicle, self._filter, seed)
         if self._trust is not None:
             self._fusion.trust = self._trust
@@ -264,6 +270,7 @@ class Estimator:
             demanded=self.demand,
             afforded=afforded,
             reset_counter=self.reset_counter + (0 if self._tracker is None else self._tracker.jumps),
+            mode=None if self._mode is None or pose is None else self._mode.mode,
         )
 
     @property

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 from drivers.sample import AnyReading
 from filters.belief import Belief, Displacement, Moments
 from filters.density.gaussian import radius
 from filters.motion.learned import SlowState
 from filters.motion.prediction import IntervalNoise, process_covariance, velocity_moments
-from filters.motion.unicycle import GYRO_BIAS, ODOMETRY_SCALE, Unicycle, UnicycleControl
+from filters.motion.standing import StandingUnicycle
+from filters.motion.unicycle import GYRO_BIAS, ODOMETRY_SCALE, UnicycleControl
 from filters.particle import ParticleFilter
 from service.config import Configuration
 from service.estimator.carrier import Carrier, Pose
@@ -37,12 +39,29 @@ HEADING_KNOWN = 0.35
 _HEADING = 2
 
 
+class Gait(Protocol):
+    """What a ground vehicle wants to know of its motion mode."""
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is certain to stand still."""
+        ...
+
+    def approach(self, start: int, end: int) -> None:
+        """Take the controls of the stretch that the belief is about to be moved over."""
+        ...
+
+    def doubt(self, distance: float, duration: float) -> float:
+        """Return the variance (m²) by which a distance is to be doubted, over so many seconds."""
+        ...
+
+
 class GroundVehicle:
     """Unicycle motion, controls and height; see :class:`service.estimator.vehicle.Vehicle`."""
 
     def __init__(self, configuration: Configuration) -> None:
         settings = configuration.motion
-        self.motion = Unicycle(
+        self.motion = StandingUnicycle(
             settings.speed_noise,
             settings.yaw_rate_noise,
             settings.gyro_bias_walk,
@@ -55,14 +74,35 @@ class GroundVehicle:
         self.controls: Controls = controls_of(settings)
         self.slow_states: list[SlowState] = sensor_states(configuration)
         self._height = Height()
+        self._gait: Gait | None = None
+
+    def heed(self, gait: Gait) -> None:
+        """Heed from now on whether the vehicle stands and how far its wheels are to be doubted."""
+        self._gait = gait
 
     def predict(self, belief: ParticleFilter[UnicycleControl], start: int, end: int) -> None:
         """Move the particles by what the controls say of ``start`` to ``end`` (nanoseconds)."""
         duration = (end - start) / SECOND
-        belief.predict(self.control(start, end), duration)
+        if self._gait is not None:
+            self._gait.approach(start, end)
+        if self._gait is not None and self._gait.stands:
+            turn = self.rolled(start, end).turn
+            self.motion.stand(belief.column(GYRO_BIAS), belief.weights, turn, duration)
+        else:
+            belief.predict(self.control(start, end), duration)
         self._height.wander(duration)
 
     def control(self, start: int, end: int) -> UnicycleControl:
+        """Return what odometer and gyro say of ``start`` to ``end``, doubted as far as the wheels slip."""
+        rolled = self.rolled(start, end)
+        if self._gait is None:
+            return rolled
+        doubt = self._gait.doubt(rolled.distance, (end - start) / SECOND)
+        return (
+            rolled._replace(distance_sigma=math.sqrt(rolled.distance_sigma**2 + doubt)) if doubt else rolled
+        )
+
+    def rolled(self, start: int, end: int) -> UnicycleControl:
         """Return what odometer and gyro say of ``start`` to ``end``, with what is unknown of it as a sigma."""
         distance, turn = self.controls.distance(start, end), self.controls.turn(start, end)
         return UnicycleControl(

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from filters.kld import Demand
 from filters.particle import ParticleFilter
-from filters.policy import EffectiveShare, Policy, Wear
+from filters.policy import EffectiveShare, Policy, Wear, WhenStill
 from service.config import Configuration
 from service.estimator.hypotheses import Tracker
 from service.estimator.stopwatch import Stopwatch
 from service.estimator.track import SECOND
 
-RESAMPLING: Policy = EffectiveShare(0.5)
-"""When to resample: equation 4.36's effective sample size below half of the particles there are."""
+RESAMPLING: Policy = WhenStill(still=EffectiveShare(0.05), moving=EffectiveShare(0.5))
+"""When to resample: equation 4.36's effective sample size below half of the particles there are. What is forgotten
+while nothing moves is never brought back, so then the weights multiply up until hardly any particle is left."""
 
 POSITION_BIN = 0.25
 HEADING_BIN = 0.1
@@ -62,6 +64,7 @@ class Population:
         )
         self.demand = self._budget.particles_min
         self.tracker: Tracker | None = None
+        self.still: Callable[[], float] = lambda: 0.0
         self._reckoned = -(2**62)
 
     def clamp(self, wanted: int, afforded: int) -> int:
@@ -71,7 +74,7 @@ class Population:
     def resample_if_worn(self, afforded: int) -> None:
         """Normalise the weights, and draw anew where they differ too much (lines 8 to 11 of Table 4.3)."""
         self._belief.normalize()
-        if RESAMPLING.due(Wear(self._belief.count, self._belief.effective_sample_size)):
+        if RESAMPLING.due(Wear(self._belief.count, self._belief.effective_sample_size, self.still())):
             self.resample(afforded)
         self._stopwatch.lap("resampling")
 

@@ -17,7 +17,17 @@ from service.config import Configuration
 from service.estimate import Budget, Health, ProcessStatus, Publishing, Sensors, StageCost, Status, schema
 from service.publish.inbox import PROCESSES, Inbox, Value
 from service.publish.outlet import Answer, RefusedError
-from service.publish.topics import BUDGET, CONFIG, ESTIMATE, HEALTH, LATEST, SCHEMA, SENSORS, STATUS
+from service.publish.topics import (
+    BUDGET,
+    CONFIG,
+    ESTIMATE,
+    HEALTH,
+    LATEST,
+    PARTICLES,
+    SCHEMA,
+    SENSORS,
+    STATUS,
+)
 
 T = TypeVar("T")
 
@@ -31,6 +41,8 @@ class Book:
     ----------
     newest : dict[str, bytes]
         Payload by topic.
+    cloud : Value or None
+        The newest cloud, with its attachment.
     published, unsent : Counter[str]
         Values put, and values that found no session, by topic.
     seconds : deque[float]
@@ -43,6 +55,7 @@ class Book:
 
     def __init__(self) -> None:
         self.newest: dict[str, bytes] = {}
+        self.cloud: Value | None = None
         self.published: Counter[str] = Counter()
         self.unsent: Counter[str] = Counter()
         self.seconds: deque[float] = deque(maxlen=_PUTS)
@@ -53,6 +66,8 @@ class Book:
     def note(self, value: Value) -> None:
         """Remember a value as the newest of its topic."""
         self.newest[value.topic] = value.payload
+        if value.topic == PARTICLES.key:
+            self.cloud = value
 
     def publishing(self, inbox: Inbox) -> Publishing:
         """Return the counts as they go out with the status."""

@@ -7,7 +7,7 @@ in ring channels until :meth:`Outlet.answer` polls them.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 import msgspec
@@ -23,6 +23,11 @@ Answer = Callable[[], bytes]
 
 Request = Callable[[bytes], bytes]
 """Takes what the payload of a query asks for and makes the JSON of the answer, or raises :class:`RefusedError`."""
+
+Reply = Callable[[bytes], None]
+Refuse = Callable[[str], None]
+Slow = Callable[[Mapping[str, str], Reply, Refuse], None]
+"""Begins what the parameters of a query ask for, or raises :class:`RefusedError`; one of the others is called later."""
 
 _WAITING_QUERIES = 64
 
@@ -48,6 +53,8 @@ class Outlet:
         What each of :data:`~service.publish.topics.QUERIES` answers.
     requests : dict[str, Request], optional
         What takes each of those that ask for something.
+    slow : dict[str, Slow], optional
+        What begins each of those whose answer takes its time.
     """
 
     def __init__(
@@ -56,16 +63,18 @@ class Outlet:
         keys: Keys,
         answers: dict[str, Answer],
         requests: dict[str, Request] | None = None,
+        slow: dict[str, Slow] | None = None,
     ) -> None:
         self._opened = opened
         self._keys = keys
         self._answers = answers
         self._requests = requests or {}
+        self._slow = slow or {}
         session = opened.session
         self._publishers = {topic.key: _declare(session, keys, topic) for topic in TOPICS}
         self._queryables = {
             key: session.declare_queryable(keys.of(key), _ring(), complete=True)
-            for key in (*QUERIES, *self._requests)
+            for key in (*QUERIES, *self._requests, *self._slow)
         }
         self._token = session.liveliness().declare_token(keys.of(LIVE))
 
@@ -101,8 +110,11 @@ class Outlet:
         """
         for key, queryable in self._queryables.items():
             while (query := queryable.try_recv()) is not None:
-                with query:
-                    self._reply(key, query)
+                if key in self._slow:
+                    self._begin(key, query)
+                else:
+                    with query:
+                        self._reply(key, query)
 
     def close(self, seconds: float) -> bool:
         """Close the session and its liveliness token within ``seconds``; tell whether it is closed."""
@@ -114,10 +126,32 @@ class Outlet:
         except RefusedError as refusal:
             query.reply_err(msgspec.json.encode({"reason": str(refusal)}), encoding=JSON)
 
+    def _begin(self, key: str, query: zenoh.Query) -> None:
+        """Begin an answer; the query is kept open until it is there."""
+
+        def reply(payload: bytes) -> None:
+            with query:
+                query.reply(self._keys.of(key), payload, encoding=JSON)
+
+        def refuse(reason: str) -> None:
+            with query:
+                query.reply_err(msgspec.json.encode({"reason": reason}), encoding=JSON)
+
+        try:
+            self._slow[key](_parameters(query), reply, refuse)
+        except RefusedError as refusal:
+            refuse(str(refusal))
+
     def _made(self, key: str, query: zenoh.Query) -> bytes:
         if key not in self._requests:
             return self._answers[key]()
         return self._requests[key](b"" if query.payload is None else query.payload.to_bytes())
+
+
+def _parameters(query: zenoh.Query) -> dict[str, str]:
+    """Return what stands behind the question mark of a selector, ``name=value;name=value``."""
+    parts = (part.partition("=") for part in str(query.parameters).split(";") if part)
+    return {name: value for name, _, value in parts}
 
 
 def _ring() -> zenoh.handlers.RingChannel[zenoh.Query]:

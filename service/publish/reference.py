@@ -17,7 +17,10 @@ from msgspec import inspect as types
 
 from service.estimate import (
     Budget,
+    Cell,
     Cloud,
+    Component,
+    Density,
     Distribution,
     Estimate,
     Health,
@@ -32,7 +35,17 @@ from service.estimate import (
     Status,
 )
 from service.publish.session import LOOPBACK
-from service.publish.topics import CLOUD_BYTES, HISTORY, LIVE, PARTICLES, PREFIX, QUERIES, TOPICS, Topic
+from service.publish.topics import (
+    CLOUD_BYTES,
+    HISTORY,
+    LIVE,
+    PARTICLES,
+    PREFIX,
+    QUERIES,
+    REQUESTS,
+    TOPICS,
+    Topic,
+)
 
 VALUES = (
     Estimate,
@@ -49,12 +62,20 @@ VALUES = (
     ProcessStatus,
     Publishing,
     Cloud,
+    Density,
+    Component,
+    Cell,
 )
 
 ANSWERS = {
     "@rpc/latest": "the last `Estimate`",
     "@rpc/status": "`Status`: the last of everything, the processes, and what the publisher dropped",
     "@rpc/config": "the configuration in force, with all defaults",
+    "@rpc/density": "with `?extractor=` one of `gaussian`, `kmeans`, `histogram`, `tree` or `kernel`: a `Density` of the "
+    "last particle cloud; it takes a second or two",
+    "@rpc/reinitialize": "begins anew: the payload is JSON as `[start]` has it, "
+    '`{"position": [n, e, d], "heading": radians}` or `{"mode": "global"}`; refused with a reason when wrong, '
+    'else `{"accepted": true}`, and `reset_counter` steps',
     "@rpc/schema": 'JSON Schema of every value: `{"$defs": …, "values": {"Estimate": …}}`',
 }
 
@@ -203,7 +224,7 @@ def _parts() -> Iterator[str]:
         )
         yield f"| {' | '.join(row)} |\n"
     yield _QOS
-    for key in QUERIES:
+    for key in (*QUERIES, *REQUESTS):
         yield f"| `{key}` | {ANSWERS[key]} |\n"
     yield _ASKING
     yield f"\n```python\n{SUBSCRIBER}```\n"

@@ -68,6 +68,9 @@ SCHEMA = "@rpc/schema"
 QUERIES = (LATEST, STATUS, CONFIG, SCHEMA)
 
 REINITIALIZE = "@rpc/reinitialize"
+DENSITY = "@rpc/density"
+REQUESTS = (REINITIALIZE, DENSITY)
+"""Queries that ask the belief for something."""
 
 LIVE = "@live"
 

@@ -23,11 +23,12 @@ from service.backoff import BackOff
 from service.channels import Outlet as Queue
 from service.config import Configuration
 from service.publish.answers import Book, answers
+from service.publish.densities import Densities
 from service.publish.desk import Desk
 from service.publish.inbox import PROCESSES, Inbox, Value
 from service.publish.outlet import Outlet, Request
 from service.publish.session import Opened, SessionError, close, open_embedded, open_from_file, plain
-from service.publish.topics import ESTIMATE, HEALTH, HISTORY, REINITIALIZE, SLOW, Keys
+from service.publish.topics import DENSITY, ESTIMATE, HEALTH, HISTORY, REINITIALIZE, SLOW, Keys
 
 log = logging.getLogger(__name__)
 
@@ -108,6 +109,7 @@ class Publisher:
         self._answers = answers(configuration, self._book, self._inbox)
         desk = Desk(configuration, None if orders is None else Queue(orders))
         self._requests: dict[str, Request] = {REINITIALIZE: desk.reinitialize}
+        self._densities = Densities(lambda: self._book.cloud)
         self._outlet: Outlet | None = None
         self._changes: deque[Value] = deque(maxlen=HISTORY)
         self._slow_at = 0.0
@@ -129,6 +131,7 @@ class Publisher:
         if self._outlet is not None:
             try:
                 self._outlet.answer()
+                self._densities.look_after()
             except zenoh.ZError as error:
                 self._book.unsent["reply"] += 1
                 log.warning("a query could not be answered: %s", plain(error))
@@ -136,6 +139,7 @@ class Publisher:
     def close(self, seconds: float) -> bool:
         """Close the session within ``seconds``; tell whether it is closed (or there was none)."""
         outlet, self._outlet = self._outlet, None
+        self._densities.close()
         return outlet is None or outlet.close(seconds)
 
     def _publish(self, value: Value) -> None:
@@ -177,7 +181,8 @@ class Publisher:
             self._retry_later(str(error))
             return
         try:
-            self._outlet = Outlet(opened, self._keys, self._answers, self._requests)
+            slow = {DENSITY: self._densities.ask}
+            self._outlet = Outlet(opened, self._keys, self._answers, self._requests, slow)
         except zenoh.ZError as error:
             close(opened.session, _CLOSING)
             self._retry_later(plain(error))

@@ -79,7 +79,7 @@ class SmallEstimator:
         return [SensorStatus("range/bus/1", 5.0, None, 7, {"late": 1}, 0.1, 0.2)]
 
     def hypotheses(self, unix: float, /) -> Hypotheses | None:
-        return Hypotheses(unix, [])
+        return None if self.health == HealthState.WAITING else Hypotheses(unix, [])
 
     def cloud(self, count: int, /) -> NDArray[np.float32]:
         return np.ones((min(count, 10), 4), np.float32)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from service.estimate import schema
 from service.publish.reference import SUBSCRIBER, page
-from service.publish.topics import LIVE, QUERIES, TOPICS
+from service.publish.topics import LIVE, QUERIES, REQUESTS, TOPICS
 from tests.service.publish.conftest import Daemon
 from tests.service.publish.spoken import estimate, tagged, wait_for
 
@@ -24,7 +24,7 @@ def test_the_page_is_up_to_date() -> None:
 def test_the_documented_keys_are_the_declared_ones() -> None:
     introduction = page().partition("## The values")[0]
     documented = re.findall(r"^\| `([^`]+)` \|", introduction, re.MULTILINE)
-    assert documented == [topic.key for topic in TOPICS] + list(QUERIES)
+    assert documented == [topic.key for topic in TOPICS] + list(QUERIES) + list(REQUESTS)
     assert f"`{LIVE}`" in introduction
 
 

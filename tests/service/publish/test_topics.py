@@ -15,6 +15,7 @@ def test_the_keys_are_those_of_the_interface() -> None:
     assert [keys.of(topic.key) for topic in TOPICS] == [
         "beliefd/v1/mower/estimate",
         "beliefd/v1/mower/estimate/slow",
+        "beliefd/v1/mower/hypotheses",
         "beliefd/v1/mower/particles",
         "beliefd/v1/mower/budget",
         "beliefd/v1/mower/sensors",
@@ -35,6 +36,7 @@ def test_the_qualities_of_service_are_those_of_the_interface() -> None:
     assert {topic.key: (topic.priority, topic.encoding) for topic in TOPICS} == {
         "estimate": (priority.REAL_TIME, "application/json;beliefd.Estimate"),
         "estimate/slow": (priority.DATA, "application/json;beliefd.Estimate"),
+        "hypotheses": (priority.DATA_HIGH, "application/json;beliefd.Hypotheses"),
         "particles": (priority.BACKGROUND, "application/octet-stream;beliefd.Cloud"),
         "budget": (priority.DATA_LOW, "application/json;beliefd.Budget"),
         "sensors": (priority.DATA_LOW, "application/json;beliefd.Sensors"),

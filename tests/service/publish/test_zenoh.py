@@ -16,7 +16,7 @@ import zenoh
 
 from service.estimate import HealthState, Status
 from service.publish.session import Opened, SessionError
-from service.publish.topics import QUERIES, TOPICS
+from service.publish.topics import QUERIES, REQUESTS, TOPICS
 from service.publish.zenoh import Publisher
 from tests.service.publish.conftest import Daemon
 from tests.service.publish.spoken import (
@@ -200,7 +200,7 @@ def test_no_wildcard_fires_a_query(start: Start, client: Client, endpoint: str) 
     session = client()
     status(session)
     assert list(session.get(ROOT + "**", timeout=1.0)) == []
-    assert len(list(session.get(ROOT + "@rpc/*", timeout=5.0))) == len(QUERIES)
+    assert len(list(session.get(ROOT + "@rpc/*", timeout=5.0))) == len(QUERIES) + len(REQUESTS)
 
 
 def test_every_value_fits_the_schema_that_is_told(start: Start, client: Client, endpoint: str) -> None:

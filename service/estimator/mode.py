@@ -1,0 +1,213 @@
+"""The motion mode: still, moving or slipping.
+
+A discrete Bayes filter (Table 4.1) over the three, with rates at which one turns into another. Every stretch of the
+odometry and of the gyro is evidence between still and moving. Between moving and slipping nothing on board can tell
+but what is measured from outside: two Gaussians that interact (:mod:`filters.linearised.interacting`), one taking the
+wheels at their word and one doubting them by :data:`SLIP`, say of each measurement how well they expected it.
+
+What follows from it: a vehicle that certainly stands is neither moved nor resampled, and its gyro's reading is its
+bias; the wheels of one that slips are doubted, so that neither the pose nor the odometry's scale is led away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from filters.belief import Evidence
+from filters.discrete import DenseTransition, DiscreteBayesFilter
+from filters.kalman import Matrix
+from filters.linearised.bank import BATCHED, GaussianBank
+from filters.linearised.interacting import mix
+from filters.motion.learned import SlowState
+from filters.motion.unicycle import Unicycle, UnicycleControl
+from filters.particle import ParticleFilter
+from service.config import Configuration
+from service.estimate import MotionMode
+from service.estimator.ground import GroundVehicle
+from service.estimator.measuring import Measurement
+from service.estimator.track import SECOND
+from service.estimator.vehicle import Vehicle
+from service.estimator.witnesses import gaussian_of
+
+GENERATOR = np.array(((-0.2, 0.2, 0.0), (0.05, -0.06, 0.01), (0.05, 0.2, -0.25)))
+"""Per second: how often still, moving, slipping (rows) turn into each other; a slip lasts some 5 s, each 100 s."""
+
+SLIP = 0.3
+"""How far wheels that slip are off, as a share of the speed (one standard deviation)."""
+
+GRIP = 1.0
+"""Seconds for which a slip goes on in one way: it adds up faster than noise."""
+
+CREEP = 0.01
+"""m/s below which wheels do not turn."""
+
+SPIN = 0.02
+"""rad/s below which a gyro does not turn, its bias taken off."""
+
+WHEELS_STAND = np.log((0.99, 0.03, 0.0001))
+WHEELS_TURN = np.log((0.0001, 0.97, 0.9999))
+GYRO_STANDS = np.log((0.99, 0.4, 0.4))
+GYRO_TURNS = np.log((0.01, 0.6, 0.6))
+"""Log probability of what a :data:`STRETCH` of wheels and gyro looks like in each mode. The wheels of a vehicle that
+creeps may stand; the gyro of one that drives straight does."""
+
+STRETCH = 0.2
+"""Seconds of odometry that count as one independent reading."""
+
+SLIPPERY, GRIPPING = 0.5, 0.1
+"""Probability of slipping from which wheels are doubted, and below which those that slipped are believed again."""
+
+CERTAIN = 0.9
+"""Probability from which the vehicle is treated as standing."""
+
+NARROW, NARROW_HEADING = 3.0, 0.35
+"""Metres and radians: the spread of a belief that two Gaussians can stand for."""
+
+CHECKING = SECOND
+"""Nanoseconds after which they are compared with the belief again."""
+
+FAR = 16.0
+"""Squared distance from the belief, in standard deviations, at which they begin anew as it is."""
+
+_MODES = tuple(MotionMode)
+
+
+class Mode:
+    """Follows the motion mode; a :class:`~service.estimator.companion.Companion` that is also told before each move.
+
+    Parameters
+    ----------
+    motion : Unicycle
+        How the vehicle moves.
+    slow : list of SlowState
+        Slow states beside it.
+    belief : ParticleFilter
+        What the two Gaussians begin as.
+    rolled : callable
+        What odometer and gyro said between two times, undoubted.
+    """
+
+    def __init__(
+        self,
+        motion: Unicycle,
+        slow: list[SlowState],
+        belief: ParticleFilter[Any],
+        rolled: Callable[[int, int], UnicycleControl],
+    ) -> None:
+        self._motion = motion
+        self._belief = belief
+        self._rolled = rolled
+        self._bank = GaussianBank(motion, slow, 2)
+        self._modes = DiscreteBayesFilter[MotionMode](_MODES, np.eye(3), (1 / 3, 1 / 3, 1 / 3))
+        self._slips = False
+        self._bias = 0.0
+        self._checked = 0
+
+    @property
+    def mode(self) -> MotionMode:
+        """The most likely one; slipping, until that has become unlikely."""
+        return MotionMode.SLIPPING if self._slips else self._modes.most_likely
+
+    @property
+    def still(self) -> float:
+        """Probability of standing still."""
+        return self._modes.probability(MotionMode.STILL)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the vehicle is certain to stand still."""
+        return self.still >= CERTAIN
+
+    def doubt(self, distance: float, duration: float) -> float:
+        """Return the variance (m²) by which a distance is to be doubted, over so many seconds."""
+        return _slip_variance(distance, duration) if self._slips and duration > 0.0 else 0.0
+
+    # --- before a move --------------------------------------------------------------------------------------------
+
+    def approach(self, start: int, end: int) -> None:
+        """Take what odometer and gyro say of the stretch that the belief is about to be moved over."""
+        duration = (end - start) / SECOND
+        if duration <= 0.0:
+            return
+        slipping = self._modes.probability(MotionMode.SLIPPING)
+        self._slips = slipping >= (GRIPPING if self._slips else SLIPPERY)
+        control = self._rolled(start, end)
+        matrix = np.eye(3) + min(duration, 1.0) * GENERATOR  # exp(Q t) to first order: strides are short
+        if self._bank.live.all():
+            mix(self._bank, _among_wheeled(matrix), self._modes.belief[1:] + 1e-12)
+        self._modes.propagate(DenseTransition(matrix))
+        share = min(1.0, duration / STRETCH)
+        if control.distance_sigma == 0.0:
+            turns = abs(control.distance) > CREEP * duration
+            self._modes.update_log(share * (WHEELS_TURN if turns else WHEELS_STAND))
+        if control.turn_sigma == 0.0:
+            turns = abs(control.turn - self._bias * duration) > SPIN * duration
+            self._modes.update_log(share * (GYRO_TURNS if turns else GYRO_STANDS))
+
+    # --- a companion of the belief --------------------------------------------------------------------------------
+
+    def started(self, time: int) -> None:
+        """Let the Gaussians begin anew as the belief does."""
+        self._bank.live[:] = False
+        self._checked = time - CHECKING
+
+    def moved(self, start: int, end: int) -> None:
+        """Move both Gaussians, one of them in doubt of the wheels."""
+        duration = (end - start) / SECOND
+        control = self._rolled(start, end)
+        if not self.stands:
+            doubt = np.array([0.0, _slip_variance(control.distance, duration)])
+            self._bank.predict(control, duration, doubt)
+        if end - self._checked >= CHECKING:
+            self._checked = end
+            self._check()
+
+    def weighed(self, time: int, measured: Measurement, evidence: Evidence, outlier: bool) -> None:
+        """Weigh both Gaussians, and the modes by how well they expected the measurement."""
+        if type(measured.model) not in BATCHED or not self._bank.live.all():
+            return
+        expectations = self._bank.expect(measured.model, measured.value)
+        said = self._bank.correct(expectations, self._bank.live, 0.9999)
+        logs = np.logaddexp(said.log_evidence, measured.log_outlier)
+        self._modes.update_log(np.array([logs[0], logs[0], logs[1]]))
+
+    def _check(self) -> None:
+        """Begin anew as the belief where the Gaussians are not live or have lost it."""
+        moments = self._belief.moments()
+        self._bias = float(moments.mean[3])
+        wide = float(np.trace(moments.pose_covariance[:2, :2])) > 2.0 * NARROW**2
+        if wide or float(moments.variance[2]) > NARROW_HEADING**2:
+            self._bank.live[:] = False
+            return
+        if self._bank.live.all():
+            away = moments.mean[:2] - self._bank.mean[:, :2]
+            spread = self._bank.covariance[:, :2, :2] + moments.pose_covariance[:2, :2] + 0.01 * np.eye(2)
+            distances = np.einsum("mi,mij,mj->m", away, np.linalg.inv(spread), away)
+            if (distances < FAR).all():
+                return
+        mean, covariance = gaussian_of(self._belief, self._motion.conditional_variances)
+        for member in range(2):
+            self._bank.set(member, mean, covariance)
+
+
+def _slip_variance(distance: float, duration: float) -> float:
+    """Return the variance of the distance that slipping wheels count over a stretch."""
+    return 2.0 * GRIP * (SLIP * distance) ** 2 / duration
+
+
+def _among_wheeled(matrix: Matrix) -> Matrix:
+    """Return the transition between moving and slipping alone: of a vehicle that stands neither Gaussian moves."""
+    inner = matrix[1:, 1:] + np.diag(matrix[1:, 0])
+    return inner / inner.sum(axis=1, keepdims=True)
+
+
+def mode_of(configuration: Configuration, vehicle: Vehicle, belief: ParticleFilter[Any]) -> Mode | None:
+    """Return who follows the mode of a vehicle, and have the vehicle heed it; ``None`` where it is switched off."""
+    if not (configuration.honesty.motion_mode and isinstance(vehicle, GroundVehicle)):
+        return None
+    mode = Mode(vehicle.motion, vehicle.slow_states, belief, vehicle.rolled)
+    vehicle.heed(mode)
+    return mode
