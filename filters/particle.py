@@ -284,8 +284,10 @@ class ParticleFilter(Generic[Control]):
         # as the constructor makes it, without its call in Python
         return tuple.__new__(Evidence, (log_mean, innovation, True))
 
-    def weigh_past(self, sensor: Sensor[M], measurement: M, past: ParticleSet, known: NDArray[np.bool_]) -> Evidence:
-        """Line 5 for a measurement of an earlier time: a particle is the end of a path (eq. 4.30), weighed by where it was.
+    def weigh_past(
+        self, sensor: Sensor[M], measurement: M, past: ParticleSet, known: NDArray[np.bool_]
+    ) -> Evidence:
+        """Line 5 for a measurement of an earlier time: a particle is the end of a path (eq. 4.30).
 
         Parameters
         ----------

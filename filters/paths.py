@@ -107,7 +107,9 @@ class Paths:
         Past or None
             The slow states are those of now. ``None`` where no mark is as old as that.
         """
-        after = next((index for index, (marked, _) in enumerate(self._marked) if marked > time), len(self._marked))
+        after = next(
+            (index for index, (marked, _) in enumerate(self._marked) if marked > time), len(self._marked)
+        )
         if after == 0:
             return None
         count = self._belief.count
