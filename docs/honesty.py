@@ -29,6 +29,9 @@ CALIBRATION = ("<!-- calibration: begin -->", "<!-- calibration: end -->")
 ABLATION = ("<!-- ablation: begin -->", "<!-- ablation: end -->")
 SCENARIOS = ("beacons", "mirror", "kidnap", "late_fix", "spoof", "multipath", "slip", "jam", "outage")
 SWITCHES = ("hypotheses", "recovery", "trust", "motion_mode")
+LIED_TO = ("kidnap",)
+"""Scenarios whose start is a lie told with certainty: no belief can be right until the evidence comes."""
+
 MARGIN = 4.0
 """Points by which observed may differ from claimed."""
 
@@ -94,8 +97,9 @@ def curve(levels: list[int]) -> np.ndarray:
 
 
 def curves(kept: dict[str, Any], part: str) -> dict[str, np.ndarray]:
-    """Return the curves of a part, by name, of whatever had a truth."""
-    return {name: curve(one["levels"]) for name, one in kept.get(part, {}).items() if one["levels"]}
+    """Return the curves of a part, by name, of whatever had a truth and was not lied to."""
+    told = {name: one for name, one in kept.get(part, {}).items() if name not in LIED_TO}
+    return {name: curve(one["levels"]) for name, one in told.items() if one["levels"]}
 
 
 def plain(name: str) -> str:
@@ -152,7 +156,7 @@ def calibration(kept: dict[str, Any]) -> str:
             if not one["levels"]:
                 continue
             observed = curve(one["levels"])
-            every.append(observed)
+            every += [observed] if name not in LIED_TO else []
             low, high = one["nees_bounds"]
             cells = (
                 f"scenario `{name}`" if part == "scenarios" else name,

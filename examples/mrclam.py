@@ -40,15 +40,16 @@ landmarks = "{landmarks}"
 """
 MOTION = """\
 speed_noise = 0.02
-yaw_rate_noise = 0.05
-slip_noise = 0.05
+yaw_rate_noise = 0.02
+slip_noise = 0.07
 turn_noise = 0.15
 gyro_bias_sigma = 0.05
-odometry_scale_sigma = 0.05
+odometry_scale_sigma = 0.1
+odometry_scale_walk = 0.003
 """
 SENSOR = """\
-sigma = 0.15
-sigma_bearing = 0.05
+sigma = 0.5                       # 0.08 apart, but a landmark's errors are alike for ten seconds and more
+sigma_bearing = 0.03
 outliers = 0.05
 """
 

@@ -19,7 +19,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from filters.discrete import DenseTransition, DiscreteBayesFilter
+from filters.discrete import DiscreteBayesFilter
+from filters.transition import DenseTransition
 
 Matrix = NDArray[np.float64]
 

@@ -12,13 +12,13 @@ arithmetic of the correction is the Kalman filter's own. Models of the vehicle a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from filters.duration import require_duration
 from filters.kalman import (
     Correction,
     Expectation,
@@ -153,10 +153,7 @@ class ExtendedKalmanFilter(Generic[Control]):
         ValueError
             A duration or control that is negative or not finite; the belief is unchanged then.
         """
-        if not 0.0 <= duration < math.inf:
-            raise ValueError(
-                f"extended Kalman filter: duration must be finite and not negative, got {duration} s"
-            )
+        require_duration("extended Kalman filter", duration)
         mean, jacobian, noise = self._motion.move(self.mean, control, duration)
         covariance = symmetric(jacobian @ self.covariance @ jacobian.T + noise)
         require_finite("extended Kalman prediction", mean, covariance)

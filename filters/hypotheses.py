@@ -13,8 +13,8 @@ particles lives, whatever its weight. A few times a second :meth:`Hypotheses.loo
 
 A valley must be deeper to divide than to keep apart, so the count does not flicker.
 
-The leader is the one that is spoken for. It stays so until another has twice its weight, for the first of two that are
-as likely as each other should not change with every measurement.
+The leader is the one that is spoken for. It stays so until another has four times its weight, for of two that are as
+likely as each other the first should not change with every few measurements.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ TOGETHER = Depth(ratio=0.7, significance=2.0, least=FOUND)
 NEAR = 3.0
 """Bhattacharyya distance of two hypotheses as Gaussians above which no one need look for a valley between them."""
 
-LEADS = 2.0
+LEADS = 4.0
 """How many times the leader's weight another must have to lead."""
 LEAST_PART = 0.1
 """Least share of the particles that a living hypothesis is given, or an equal part of half of them if that is less."""

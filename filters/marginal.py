@@ -24,20 +24,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from filters import resampling
 from filters.belief import Evidence
+from filters.duration import require_duration
 from filters.kalman import (
     LOG_TWO_PI,
     Matrix,
     checked_gaussian,
     joseph,
-    require_finite,
-    require_shape,
     symmetric,
     wrap,
 )
@@ -45,112 +44,17 @@ from filters.kernels import marginal as kernels
 from filters.kernels import random, weights
 from filters.kernels.compile import Float32Array
 from filters.kernels.resampling import RUN, deal
+from filters.mixed import MixedMotion, MixedSensor, check_observation, check_step
+from filters.particle_checks import check_columns
 from filters.particle_set import ParticleSet
 from filters.sensing.model import Sensor
 
 Control = TypeVar("Control")
-ControlIn = TypeVar("ControlIn", contravariant=True)
-Measurement = TypeVar("Measurement", contravariant=True)
 M = TypeVar("M")
 
 _RESAMPLING_STREAM = 1 << 32
 _SINGULAR = 1e-12
 """A pivot this much smaller than its variance is rounding: that direction of the increment is certain."""
-
-
-class MixedStep(NamedTuple):
-    """One prediction, for k increments and l linear states: the same numbers for every particle.
-
-    Attributes
-    ----------
-    offset : (k,) float64
-        a, the increment as far as the control says it.
-    coupling : (k, l) float64
-        A, the linear states' part in it.
-    noise : (k, k) float64
-        Q.
-    transition : (l, l) float64
-        F.
-    drift : (l,) float64
-        d.
-    linear_noise : (l, l) float64
-        R.
-    """
-
-    offset: Matrix
-    coupling: Matrix
-    noise: Matrix
-    transition: Matrix
-    drift: Matrix
-    linear_noise: Matrix
-
-
-class MixedMotion(Protocol[ControlIn]):
-    """The named requirement of a motion model."""
-
-    @property
-    def nonlinear(self) -> tuple[str, ...]:
-        """Columns that are sampled, the first rows of the particle set."""
-        ...
-
-    @property
-    def linear(self) -> tuple[str, ...]:
-        """Columns of the linear states' means, the rows that follow."""
-        ...
-
-    @property
-    def angles(self) -> tuple[int, ...]:
-        """Which of the nonlinear columns are angles, radians."""
-        ...
-
-    def begin(self, control: ControlIn, duration: float) -> MixedStep:
-        """Prepare one prediction over ``duration`` seconds."""
-        ...
-
-    def move(self, particles: ParticleSet, first: int, last: int, increments: Float32Array) -> None:
-        """Move the nonlinear columns of the particles ``first`` to ``last``: x' = f(x, v).
-
-        ``increments``, (k, >= last - first) float32, holds v; its column 0 belongs to particle ``first``.
-        """
-        ...
-
-
-class MixedObservation(NamedTuple):
-    """One measurement, the same for every particle.
-
-    Attributes
-    ----------
-    measured : (m,) float64
-        z; NaN among its components means that this one was not measured.
-    coupling : (m, l) float64
-        C.
-    noise : (m, m) float64
-        S.
-    angles : tuple of int
-        Components that are angles: their innovations are taken in [-pi, pi].
-    """
-
-    measured: Matrix
-    coupling: Matrix
-    noise: Matrix
-    angles: tuple[int, ...] = ()
-
-
-class MixedSensor(Protocol[Measurement]):
-    """The named requirement of a sensor model that sees linear states."""
-
-    def begin(self, measurement: Measurement) -> MixedObservation:
-        """Prepare one measurement."""
-        ...
-
-    def expect(
-        self, particles: ParticleSet, first: int, last: int, measurement: Measurement, expected: Float32Array
-    ) -> None:
-        """Write h(x) of the particles ``first`` to ``last`` into ``expected``, (m, >= last - first) float32.
-
-        Finite also where nothing was measured; its column 0 belongs to particle ``first``.
-        """
-        ...
 
 
 class MixedMoments(NamedTuple):
@@ -273,17 +177,14 @@ class MarginalFilter(Generic[Control]):
         if set(columns) != set(self.names):
             raise ValueError(f"initialize: columns must be {', '.join(self.names)}, got {', '.join(columns)}")
         given = np.broadcast_arrays(*(np.asarray(columns[name], np.float64) for name in self.names))
-        if given[0].ndim != 1 or not 1 <= given[0].size <= self._particles.capacity:
-            raise ValueError(
-                f"initialize: 1 to {self._particles.capacity} particles (the capacity) in one-dimensional columns "
-                f"are needed, got {given[0].shape}"
-            )
-        require_finite("initialize", *given)
+        count = check_columns(
+            "initialize", dict(zip(self.names, given, strict=True)), self._particles.capacity
+        )
         linear = len(self.names) - self._sampled
         spread = np.array(covariance, np.float64).reshape(np.shape(covariance) if linear else (0, 0))
         self.covariance = checked_gaussian("initialize", np.zeros(linear), spread).covariance
-        self._particles.columns[:, : given[0].size] = given
-        self._recount(given[0].size)
+        self._particles.columns[:, :count] = given
+        self._recount(count)
         self._level()
 
     def predict(self, control: Control, duration: float) -> None:
@@ -301,10 +202,9 @@ class MarginalFilter(Generic[Control]):
         ValueError
             A duration or control that is negative or not finite; nothing has moved then.
         """
-        if not 0.0 <= duration < math.inf:
-            raise ValueError(f"predict: duration must be finite and not negative, got {duration} s")
+        require_duration("predict", duration)
         step = self._motion.begin(control, duration)
-        self._check_step(step)
+        check_step(step, len(self.covariance))
         root, learning, gain = draw(self.covariance, step.coupling, step.noise)
         drawn = joseph(self.covariance, gain, step.coupling, step.noise)
         self.covariance = symmetric(step.transition @ drawn @ step.transition.T + step.linear_noise)
@@ -346,7 +246,8 @@ class MarginalFilter(Generic[Control]):
             The innovation's covariance is not positive; the belief is unchanged then.
         """
         observation = sensor.begin(measurement)
-        measured, coupling, noise, angles = self._check_observation(observation)
+        check_observation(observation, len(self.covariance))
+        measured, coupling, noise, angles = observation
         seen = np.flatnonzero(~np.isnan(measured))
         c, spread = coupling[seen], noise[np.ix_(seen, seen)]
         covariance = symmetric(c @ self.covariance @ c.T + spread)
@@ -482,27 +383,6 @@ class MarginalFilter(Generic[Control]):
     def _recount(self, count: int) -> None:
         self._particles.count = count
         self._bounds = list(pairwise([*range(0, count, self._block), count]))
-
-    def _check_step(self, step: MixedStep) -> None:
-        increments, linear = step.offset.size, len(self.covariance)
-        shapes = {
-            "offset": (increments,),
-            "coupling": (increments, linear),
-            "noise": (increments, increments),
-            "transition": (linear, linear),
-            "drift": (linear,),
-            "linear_noise": (linear, linear),
-        }
-        for matrix, (name, shape) in zip(step, shapes.items(), strict=True):
-            require_shape(f"marginal prediction: {name}", matrix, shape)
-        require_finite("marginal prediction", *step)
-
-    def _check_observation(self, observation: MixedObservation) -> MixedObservation:
-        measured, coupling, noise, _ = observation
-        require_shape("marginal correction: coupling", coupling, (measured.size, len(self.covariance)))
-        require_shape("marginal correction: noise", noise, (measured.size, measured.size))
-        require_finite("marginal correction", measured[~np.isnan(measured)], coupling, noise)
-        return observation
 
 
 def draw(covariance: Matrix, coupling: Matrix, noise: Matrix) -> tuple[Matrix, Matrix, Matrix]:

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from filters import strata
 from filters.belief import STILL, Displacement, Evidence, Joint, Moments
 from filters.crew import ALIGNMENT, Blocks, Crew
+from filters.duration import require_duration
 from filters.kernels import random, resampling, weights
 from filters.kernels.compile import Float32Array, Int32Array
 from filters.kernels.covariance import covariance
@@ -225,8 +226,7 @@ class ParticleFilter(Generic[Control]):
         ValueError
             A duration or control that is negative or not finite; nothing has moved then.
         """
-        if not 0.0 <= duration < math.inf:
-            raise ValueError(f"predict: duration must be finite and not negative, got {duration} s")
+        require_duration("predict", duration)
         move = self._motion.begin(control, duration)
         self._motion.move(self._centre, 0, 1, self._no_noise, move)
         self._centre_values.clear()

@@ -17,8 +17,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from filters.discrete import DiscreteBayesFilter, transition_over
+from filters.discrete import DiscreteBayesFilter
 from filters.grid import Array, Grid, Indices
+from filters.transition import transition_over
 
 
 class RegionGraph:

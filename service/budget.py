@@ -15,7 +15,17 @@ from numpy.typing import NDArray
 
 from service.estimate import Distribution, StageCost
 
-STAGES = ("ingest", "motion", "sensing", "resampling", "search", "extraction", "publishing", "cloud")
+STAGES = (
+    "ingest",
+    "motion",
+    "sensing",
+    "resampling",
+    "kalman",
+    "search",
+    "extraction",
+    "publishing",
+    "cloud",
+)
 TICK = "tick"
 _MILLISECONDS = 1e3
 _SHARES = {"median": 0.5, "p99": 0.99, "p999": 0.999, "p9999": 0.9999}

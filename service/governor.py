@@ -20,9 +20,10 @@ The count does not hunt: it shrinks at once when the supply falls below it, and 
 tick, only while the supply is clearly above it, and never quite up to it.
 
 When not even the least count fits, the work is thinned in the declared order: fewer measurements, as many as the
-budget pays for one by one; then no cloud; then prediction only, where every measurement is dropped. Down goes at
-once, up only after :data:`CALM` ticks that would have had room. What is not done is not measured either: with
-prediction only, the remembered cost of a measurement fades until one is tried again.
+budget pays for one by one; then no cloud; then a Kalman filter in the particles' place, whose cost is a line over the
+measurements; then prediction only, where every measurement is dropped. Down goes at once, up only after :data:`CALM`
+ticks that would have had room. What is not done is not measured either: without particles, or with prediction only, the
+remembered costs fade until it is tried again.
 
 What a cost is measured in is the caller's choice; the loop uses the processor time of its process, because
 the budget is a share of the processor: a tick that was preempted by somebody else has not cost more, and
@@ -70,6 +71,9 @@ PER_MEASUREMENT = ("motion", "sensing", "resampling")
 
 CLOUD = "cloud"
 """The stage that level 3 leaves out."""
+
+KALMAN = "kalman"
+"""The stage of level 4; its shape is over measurements, not particles."""
 
 COLD = 2.0
 """Scale before the first tick: between ticks the caches belong to others, in the rehearsal they did not."""
@@ -137,7 +141,8 @@ class Governor:
     smallest, largest : int
         Bounds of the count, whatever the budget says.
     shapes : Mapping[str, Shape]
-        Of the stages that work on particles, as far as they were measured.
+        Of the stages that work on particles, as far as they were measured; and of ``kalman`` over measurements, without
+        which level 4 is never taken.
     period : float
         Seconds from tick to tick.
 
@@ -158,8 +163,10 @@ class Governor:
         self._period = period
         self._smallest = smallest
         self._largest = largest
-        self._shapes = dict(shapes)
-        self._scales = {stage: _expecting(COLD) for stage in shapes}
+        self._shapes = {stage: shape for stage, shape in shapes.items() if stage != KALMAN}
+        self._scales = {stage: _expecting(COLD) for stage in self._shapes}
+        self._deputy = shapes.get(KALMAN)
+        self._deputy_scale = _expecting(COLD)
         self._fixed: dict[str, RunningQuantile] = {}
         self._each = RunningQuantile(WINDOW, PROBABILITY)
         self._waits = RunningQuantile(WINDOW, WAITING)
@@ -195,6 +202,11 @@ class Governor:
         shape = self._work_at(count)
         if shape > 0.0:
             self._each.add(seconds / shape)
+
+    def observe_deputy(self, seconds: float, measurements: int) -> None:
+        """Learn what a tick of the Kalman filter cost, moving and extraction included."""
+        if self._deputy is not None:
+            self._deputy_scale.add(seconds / self._deputy.at(measurements))
 
     def observe_wait(self, seconds: float) -> None:
         """Learn for how long a tick did not have the processor, from its deadline to its end."""
@@ -232,6 +244,8 @@ class Governor:
     def reserve(self, count: int) -> float:
         """Seconds to keep for what follows the weighing of ``count`` particles: resampling, extraction, the sending."""
         stages = (self._stage_at(stage, count) for stage in ("resampling", "extraction"))
+        if self._rung.level is Level.KALMAN and self._deputy is not None:
+            stages = (self._deputy_scale.value * self._deputy.overhead,)
         sending = (self._fixed[stage].value for stage in ("publishing", CLOUD) if stage in self._fixed)
         return sum(stages) + sum(sending)
 
@@ -244,8 +258,7 @@ class Governor:
         afforded = int(min(self._limit, supply * (1.0 + 1e-9)))
         fits = afforded >= self._smallest
         self._climb(WHOLE if fits else self._fitting())
-        if self._rung.level is Level.PREDICTION_ONLY:
-            self._fade()
+        self._fade()
         level = max(self._rung.level, Level.FEWER_PARTICLES if count < demand else Level.FULL)
         return Decision(count, afforded, level, self._cause(level), self._rung.most)
 
@@ -270,7 +283,17 @@ class Governor:
         for level, spare in ((Level.THINNED, left - cloud), (Level.NO_CLOUD, left)):
             if spare >= each:
                 return Rung(level, min(CROWD, int(spare / each) if each > 0.0 else CROWD))
-        return Rung(Level.PREDICTION_ONLY, 0)
+        deputised = self._deputised(self.room - fixed)
+        return Rung(Level.KALMAN, deputised) if deputised else Rung(Level.PREDICTION_ONLY, 0)
+
+    def _deputised(self, left: float) -> int:
+        """Return how many measurements the Kalman filter could take in ``left`` seconds."""
+        if self._deputy is None:
+            return 0
+        scale = self._deputy_scale.value
+        spare = left - scale * self._deputy.overhead
+        each = scale * self._deputy.per_particle
+        return max(0, min(CROWD, int(spare / each) if each > 0.0 else CROWD))
 
     def _climb(self, wanted: Rung) -> None:
         """Take a worse rung at once, a better one after it has been wanted for a while."""
@@ -282,8 +305,16 @@ class Governor:
             self._rung, self._calm = wanted, 0
 
     def _fade(self) -> None:
+        """Let the cost of what this rung leaves out fade; with the Kalman filter the particles do nothing at all."""
+        if self._rung.level < Level.KALMAN or self._calm:
+            return  # everything is done, or soon will be
         self._each.scale(FADING)
-        for stage in ("sensing", "resampling"):
+        resting = ("sensing", "resampling")
+        if self._rung.level is Level.KALMAN:
+            resting = tuple(self._scales)
+        else:
+            self._deputy_scale.scale(FADING)
+        for stage in resting:
             if stage in self._scales:
                 self._scales[stage].scale(FADING)
 

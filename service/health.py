@@ -118,7 +118,8 @@ class HealthMonitor:
                 f"the budget affords {facts.afforded} particles, fewer than particles_min = {facts.minimum}",
             )
         if facts.searching:
-            return HealthState.CONVERGING, facts.searching
+            unheard = f"; never heard: {', '.join(facts.missing)}" if facts.missing else ""
+            return HealthState.CONVERGING, facts.searching + unheard
         silent = self._silence(facts)
         if silent is not None and facts.ambiguity:
             return HealthState.AMBIGUOUS, f"{facts.ambiguity}; {silent}"

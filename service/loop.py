@@ -24,7 +24,7 @@ from service.debt import Debt
 from service.decisions import DecisionSender
 from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Hypotheses, Sensors, SensorStatus
 from service.estimator.course import Course, Level
-from service.governor import CLOUD, PER_MEASUREMENT, Decision, Governor, Shape
+from service.governor import CLOUD, KALMAN, PER_MEASUREMENT, Decision, Governor, Shape
 from service.inlet import Inlet
 from service.orders import Orders
 from service.schedule import NANOSECONDS, Schedule
@@ -260,6 +260,9 @@ class Loop:
         for stage, seconds in self._meters.costs.items():
             if stage in _FIXED_STAGES:
                 self._governor.observe(stage, seconds, 0)
+            elif stage == KALMAN:
+                if course.deputised:
+                    self._governor.observe_deputy(seconds, course.weighed)
             elif stage == CLOUD or not particles or seconds <= 0.0:
                 continue
             elif stage in PER_MEASUREMENT:

@@ -32,8 +32,8 @@ from drivers.sample import (
 )
 from service.budget import Meters
 from service.config import Configuration, Sensor, Start
-from service.estimator import Estimator
-from service.governor import Shape
+from service.estimator import Cause, Course, Estimator, Level
+from service.governor import KALMAN, WHOLE, Rung, Shape
 
 PARTICLE_STAGES = ("motion", "sensing", "resampling", "extraction")
 
@@ -50,15 +50,26 @@ _LEAST = 1e-11
 
 
 def rehearse(configuration: Configuration) -> dict[str, Shape]:
-    """Run a second of ticks with few and with many particles; return the shape of every stage that ran."""
+    """Run a second of ticks with few and with many particles, and with none; return the shapes of the stages."""
     few = configuration.budget.particles_min
     many = min(configuration.budget.particles_max, max(MANY, 2 * few))
     cheap, dear = costs(configuration, few), costs(configuration, many)
-    return {
+    shapes = {
         stage: line(few, cheap[stage], many, dear[stage])
         for stage in PARTICLE_STAGES
         if cheap[stage] > 0.0 and dear[stage] > 0.0
     }
+    return shapes | deputy(configuration)
+
+
+def deputy(configuration: Configuration) -> dict[str, Shape]:
+    """Return the shape of the Kalman filter that stands in for the particles, over the measurements of a tick."""
+    measurements = sum(len(_readings(sensor, configuration, 0.0)) for sensor in configuration.sensor)
+    if measurements == 0:
+        return {}
+    few = configuration.budget.particles_min
+    one, all_of_them = (costs(configuration, few, Rung(Level.KALMAN, most)) for most in (1, measurements))
+    return {KALMAN: line(1, one[KALMAN], measurements, all_of_them[KALMAN])} if one[KALMAN] > 0.0 else {}
 
 
 def line(few: int, cheap: float, many: int, dear: float) -> Shape:
@@ -69,14 +80,15 @@ def line(few: int, cheap: float, many: int, dear: float) -> Shape:
     return Shape(max(dear - slope * many, 0.0), slope)
 
 
-def costs(configuration: Configuration, count: int) -> dict[str, float]:
+def costs(configuration: Configuration, count: int, rung: Rung = WHOLE) -> dict[str, float]:
     """Return the median cost of every stage at ``count`` particles, seconds, over the ticks in which it ran."""
     meters = Meters(_TICKS)
     start = Start(mode="given", position=(0.0, 0.0, 0.0), heading=0.0, sigma_heading=0.1)
     budget = configuration.budget.model_copy(update={"particles_min": count, "particles_max": count})
     estimator = Estimator(configuration.model_copy(update={"start": start, "budget": budget}), meters)
     encoder = msgspec.json.Encoder()
-    seconds: dict[str, list[float]] = {stage: [] for stage in PARTICLE_STAGES}
+    seconds: dict[str, list[float]] = {stage: [] for stage in (*PARTICLE_STAGES, KALMAN)}
+    course = Course()
     now = 0
     for tick in range(_TICKS):
         now = 1_000_000_000 + tick * _PERIOD_NS
@@ -85,7 +97,8 @@ def costs(configuration: Configuration, count: int) -> dict[str, float]:
         if isinstance(datagram, SampleBatch):
             estimator.ingest(datagram.samples)
         meters.lap("ingest")
-        encoder.encode(estimator.tick(now, now, count))
+        course.set(rung.level, Cause.NONE, rung.most)
+        encoder.encode(estimator.tick(now, now, count, course))
         meters.end(0.0, 0.0)
         for stage, costs in seconds.items():
             if tick >= _WARM and meters.costs[stage] > 0.0:

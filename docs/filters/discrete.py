@@ -6,7 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from filters.discrete import DiscreteBayesFilter, SparseTransition, transition_over
+from filters.discrete import DiscreteBayesFilter
+from filters.transition import SparseTransition, transition_over
 from service.textbook.style import BLUE, GREY, ORANGE, RED
 
 LENGTH = 40

@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from filters.kernels.compile import Float32Array
-from filters.marginal import MarginalFilter, MixedObservation, MixedStep
+from filters.marginal import MarginalFilter
+from filters.mixed import MixedObservation, MixedStep
 from filters.particle_set import ParticleSet
 from service.textbook.style import BLUE, ORANGE
 

@@ -138,6 +138,7 @@ class RecordingReader:
                 self._malformed["lost_bytes"] += self.size - self._position
                 return
             if record is None:
+                self._position = self.size
                 return
             if isinstance(record, Chunk):
                 yield from self._unpacked(record)

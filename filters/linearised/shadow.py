@@ -63,7 +63,7 @@ class ShadowFilter:
     Parameters
     ----------
     motion : Motion
-        The particle filter's, one of :data:`MOTIONS`: its noises and walks are used, and what it
+        The particle filter's, one of :data:`MOTIONS` or derived from one: its noises and walks are used, and what it
         has learned is not touched.
     slow : sequence of RandomWalk or Learned
         Further states that only wander, as the particle filter has them.
@@ -84,7 +84,7 @@ class ShadowFilter:
     def __init__(self, motion: Motion[Any, Any], slow: Sequence[SlowState] = (), gate: float = 0.999) -> None:
         if not 0.0 < gate < 1.0:
             raise ValueError(f"shadow filter: gate is a probability in (0, 1), got {gate}")
-        make = MOTIONS.get(type(motion))
+        make = next((MOTIONS[kind] for kind in type(motion).__mro__ if kind in MOTIONS), None)
         if make is None:
             known = ", ".join(kind.__name__ for kind in MOTIONS)
             raise ValueError(f"shadow filter: {type(motion).__name__} is not among {known}")

@@ -11,16 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.checks.events import Event
-from service.estimate import Estimate, HealthState, SensorStatus
+from service.estimate import Estimate, HealthState, MotionMode, SensorStatus
 from service.score import UNSCORED, Comparison, Score, Track, Truth, compare, figures
 
 Column = NDArray[np.float64]
 
 ASKED = 0.2
 """Seconds between two looks at the sensors' trust."""
-
-SLIPPING = "slip"
-"""Word of a reason that reports slipping wheels."""
 
 
 class Flag(NamedTuple):
@@ -49,7 +46,7 @@ class Teller:
         figures = (math.nan if value is None else value for value in known)
         self._rows.append((estimate.time, *figures, estimate.hypotheses, estimate.reset_counter))
         self._health.append(estimate.health)
-        self._slipping.append(SLIPPING in estimate.reason.lower())
+        self._slipping.append(estimate.mode is MotionMode.SLIPPING)
 
     def due(self, time: float) -> bool:
         """Say whether it is time to ask the sensors."""

@@ -30,6 +30,9 @@ NOT_BUILT: dict[tuple[str, str], tuple[frozenset[object], str]] = {
 NOT_READ = (("map", "terrain"), ("map", "occupancy"), ("publish", "ros2_domain"))
 _NOTHING: tuple[object, ...] = ("", -1)
 
+_POINTING = frozenset({"velocity", "heading", "bearing", "range_bearing"})
+"""Kinds of measurement that a heading belongs to."""
+
 FILES = (("link", "signing_key_file"), ("link", "dbc"), ("publish", "zenoh"), ("map", "landmarks"))
 """Keys that name files; relative ones are relative to the configuration's folder."""
 
@@ -133,6 +136,16 @@ def _slow_states_of_others(raw: Table) -> Iterator[str]:
                 yield f"{where}: {state} is estimated for {_OWNERS[state]} only, and this is {shown(kind)}"
 
 
+def _headings_of_tags(raw: Table) -> Iterator[str]:
+    if table(raw, "vehicle").get("motion") != "constant_velocity":
+        return
+    for place, sensor in entries(raw, "sensor"):
+        kind = sensor.get("kind")
+        if kind in _POINTING:
+            where = place_in_words((*place, "kind"), raw)
+            yield f'{where}: {shown(kind)} needs a heading, which motion = "constant_velocity" has not; leave it out'
+
+
 def _slow_states_only_once(raw: Table) -> Iterator[str]:
     first: dict[str, int] = {}
     for index, (place, sensor) in enumerate(entries(raw, "sensor"), 1):
@@ -189,6 +202,7 @@ def across_sections(raw: Table) -> list[str]:
         *_area_of_a_global_start(raw),
         *_budget_within_a_tick(raw),
         *_not_built(raw),
+        *_headings_of_tags(raw),
         *_slow_states_of_others(raw),
         *_slow_states_only_once(raw),
         *_absent_files(raw),

@@ -15,12 +15,13 @@ CROWD = 64
 
 
 class Level(IntEnum):
-    """How far a tick is degraded, in the declared order; 4, the shadow Kalman filter, comes with that filter."""
+    """How far a tick is degraded, in the declared order."""
 
     FULL = 0
     FEWER_PARTICLES = 1
     THINNED = 2
     NO_CLOUD = 3
+    KALMAN = 4
     PREDICTION_ONLY = 5
 
 
@@ -56,9 +57,12 @@ class Course:
         Whether ``overrunning`` ended the weighing.
     rested : int
         Ticks left out before this one, to pay for dear ones.
+    deputised : bool
+        Whether the Kalman filter spoke for the particles, as ``KALMAN`` wants it; it cannot begin at a belief that is
+        no Gaussian, and the tick is one of prediction then.
     """
 
-    __slots__ = ("cause", "cut", "level", "most", "offered", "overrunning", "rested", "weighed")
+    __slots__ = ("cause", "cut", "deputised", "level", "most", "offered", "overrunning", "rested", "weighed")
 
     def __init__(
         self,
@@ -79,6 +83,12 @@ class Course:
         self.offered = 0
         self.weighed = 0
         self.cut = False
+        self.deputised = False
+
+    @property
+    def only_predicts(self) -> bool:
+        """Whether every measurement is to be left out."""
+        return self.level is Level.PREDICTION_ONLY or (self.level is Level.KALMAN and not self.deputised)
 
     def goes_on(self) -> bool:
         """Ask for one more measurement; the first is always granted, for a belief lives by them."""
@@ -90,6 +100,8 @@ class Course:
 
     def reached(self, demanded: int, afforded: int) -> Level:
         """Return the level of the tick: as decided, or what fewer particles and left out measurements make of it."""
+        if self.only_predicts:
+            return Level.PREDICTION_ONLY
         if self.weighed < self.offered:
             return max(self.level, Level.THINNED)
         return max(self.level, Level.FEWER_PARTICLES) if afforded < demanded else self.level
@@ -105,7 +117,9 @@ class Course:
         said: list[str] = []
         if afforded < demanded:
             said.append(f"{demanded} particles needed, {afforded} afforded")
-        if self.level is Level.PREDICTION_ONLY:
+        if self.deputised:
+            said.append("a Kalman filter speaks")
+        if self.only_predicts:
             said.append(f"only predicted, {self.offered} measurements dropped")
         elif self.weighed < self.offered:
             how = "cut after" if self.cut else "thinned to"

@@ -24,7 +24,8 @@ from service.config import Configuration, Start
 from service.estimate import Estimate, Hypotheses, SensorStatus
 from service.estimator.companion import Companion
 from service.estimator.course import CROWD, Cause, Course, Level
-from service.estimator.fusion import Fusion
+from service.estimator.deputy import Deputy
+from service.estimator.fusion import KALMAN, Fusion
 from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
 from service.estimator.latecomers import latecomers_of
@@ -105,6 +106,9 @@ class Estimator:
             self._intake.latecomers = self._fusion.latecomers = latecomers
             self._fusion.companions.append(latecomers)
         self._late = 0 if latecomers is None else latecomers.stretch
+        self._deputy = Deputy(self._vehicle, self._filter, seed)
+        self._fusion.deputy = self._deputy
+        self._fusion.companions.append(self._deputy)
         self._tracker = Tracker(self._filter) if configuration.honesty.hypotheses else None
         if self._tracker is not None:
             self._population.tracker = self._tracker
@@ -199,7 +203,7 @@ class Estimator:
         self._vehicle.controls.forget(oldest - SECOND)
         estimate = self._spoken = self._speak(now, unix, afforded, course)
         self._sequence += 1
-        self._stopwatch.lap("extraction")
+        self._stopwatch.lap(KALMAN if course.deputised else "extraction")
         return estimate
 
     def _begin(self, horizon: int, passed: Passed, afforded: int) -> Passed:
@@ -219,18 +223,31 @@ class Estimator:
 
     def _move(self, now: int, horizon: int, passed: Passed, afforded: int, course: Course) -> None:
         """Bring the belief to the horizon with all that was measured up to there."""
+        self._appoint(afforded, course)
         taken_back = self._fusion.taken_back
         self._fusion.fuse(passed, afforded, course)
         self._fusion.keep_up(horizon)
         self._fusion.catch_up(afforded, course)
         self.reset_counter += self._fusion.taken_back - taken_back
         self._find(afforded)
+        if self._deputy.speaking:
+            return
         if self._tracker is not None and course.level < Level.NO_CLOUD and not self._search.blind:
             self._tracker.look(now)
             self._stopwatch.lap("extraction")
         self._population.fit(afforded)
-        if course.level is not Level.PREDICTION_ONLY:
+        if not course.only_predicts:
             self._population.reckon(now)
+
+    def _appoint(self, afforded: int, course: Course) -> None:
+        """Have the Kalman filter stand in for the particles where the course wants it, and them take over after it."""
+        if course.level is Level.KALMAN and not self._search.blind:
+            course.deputised = self._deputy.take_over()
+        if self._deputy.speaking and not course.deputised:
+            self._deputy.hand_back(self._population.clamp(self.demand, afforded))
+            if self._tracker is not None and self._fusion.time is not None:
+                self._tracker.started(self._fusion.time)
+            self._stopwatch.lap("resampling")
 
     def _find(self, afforded: int) -> None:
         """Let the search for the place go on, and begin anew where it has found one."""
@@ -249,7 +266,8 @@ class Estimator:
 
     def _speak(self, now: int, unix: int, afforded: int, course: Course) -> Estimate:
         time = self._fusion.time
-        pose = None if time is None else self._output.at(time, now)
+        speaker = self._deputy if self._deputy.speaking else self._output
+        pose = None if time is None else speaker.at(time, now)
         facts = Facts(
             now,
             time is not None,

@@ -11,7 +11,8 @@ from typing import Any
 from filters.particle import ParticleFilter
 from service.estimator.binding import Measurement, Place, Refusal
 from service.estimator.companion import Companion
-from service.estimator.course import Course, Level
+from service.estimator.course import Course
+from service.estimator.deputy import Deputy
 from service.estimator.intake import Intake, Passed, Waiting
 from service.estimator.latecomers import Latecomers
 from service.estimator.population import Population
@@ -32,6 +33,9 @@ TOGETHER = SECOND // 1000
 
 FEW = 8
 """Up to a few measurements per tick are weighed each at its own time; more of them share four times."""
+
+KALMAN = "kalman"
+"""The stage that the deputy's work is charged to, whatever it is."""
 
 OUTLIER = 0.5
 """Probability of being the outlier part's from which a measurement counts as refused: it moved next to nothing."""
@@ -61,6 +65,8 @@ class Fusion:
         The belief's time, nanoseconds; ``None`` before it began.
     companions : list[Companion]
         Who is told of every step.
+    deputy : Deputy or None
+        Moved and weighed in the particles' place while it speaks.
     search : Search or None
         Takes the measurements instead of the belief while that has no place.
     trust : Trust or None
@@ -82,6 +88,7 @@ class Fusion:
     ) -> None:
         self.time: int | None = None
         self.companions: list[Companion] = []
+        self.deputy: Deputy | None = None
         self.search: Search | None = None
         self.trust: Trust | None = None
         self.taken_back = 0
@@ -92,6 +99,18 @@ class Fusion:
         self._intake = intake
         self._health = health
         self._stopwatch = stopwatch
+
+    @property
+    def _acting(self) -> Any:
+        """Who is moved and weighed: the particles, or who stands in for them."""
+        return self.deputy if self._deputised else self._belief
+
+    @property
+    def _deputised(self) -> bool:
+        return self.deputy is not None and self.deputy.speaking
+
+    def _charge(self, stage: str) -> None:
+        self._stopwatch.lap(KALMAN if self._deputised else stage)
 
     def begin(self, time: int) -> None:
         """Begin, or begin anew, at ``time``: the particles were drawn for it."""
@@ -112,13 +131,17 @@ class Fusion:
                 self._intake.leave_out(passed[index:], "cut")
                 break
             if fused and time - self.time > together:
-                self._population.resample_if_worn(afforded)
+                self._resample_if_worn(afforded)
                 fused = False
             if not fused:
                 self.advance(time)
             self._weigh(time, waiting)
             fused = True
         if fused:
+            self._resample_if_worn(afforded)
+
+    def _resample_if_worn(self, afforded: int) -> None:
+        if not self._deputised:
             self._population.resample_if_worn(afforded)
 
     def catch_up(self, afforded: int, course: Course) -> None:
@@ -164,19 +187,19 @@ class Fusion:
         stride = max(STRIDE, (time - self.time) // 50)
         while time > self.time:
             step = min(time, self.time + stride)
-            self._vehicle.predict(self._belief, self.time, step)
+            self._vehicle.predict(self._acting, self.time, step)
             for companion in self.companions:
                 companion.moved(self.time, step)
             self.time = step
-        self._stopwatch.lap("motion")
+        self._charge("motion")
 
     def _thinned(self, passed: Passed, course: Course) -> Passed:
         """Take as many measurements as the course has room for, and refuse the rest."""
-        if len(passed) <= course.most:
-            return passed
-        if course.level is Level.PREDICTION_ONLY:
+        if course.only_predicts:
             self._intake.leave_out(passed, "prediction only")
             return []
+        if len(passed) <= course.most:
+            return passed
         taken = set(spaced([waiting.sensor.name(waiting.sample) for _, waiting in passed], course.most))
         self._intake.leave_out([item for index, item in enumerate(passed) if index not in taken], "thinned")
         return [passed[index] for index in sorted(taken)]
@@ -192,9 +215,9 @@ class Fusion:
         if not self._believed(time, waiting, measured):
             record.refused["distrusted"] += 1
             return
-        self._vehicle.level(self._belief, waiting.sample.reading, self._intake.frame, measured.repeats)
+        self._vehicle.level(self._acting, waiting.sample.reading, self._intake.frame, measured.repeats)
         self._take_evidence(time, measured, record)
-        self._stopwatch.lap("sensing")
+        self._charge("sensing")
 
     def _believed(self, time: int, waiting: Waiting, measured: Measurement) -> bool:
         """Ask whether the sensor is trusted; what one that was just found out did to the belief is taken back."""
@@ -216,7 +239,7 @@ class Fusion:
             record.accepted += 1
             record.last = time
             return
-        evidence = self._belief.weigh(measured.model, measured.value)
+        evidence = self._acting.weigh(measured.model, measured.value)
         if not evidence.accepted:
             record.refused["invalid"] += 1
             return

@@ -56,6 +56,14 @@ class Gait(Protocol):
         ...
 
 
+class Moved(Protocol):
+    """A belief that can only be moved as a whole, such as a Gaussian."""
+
+    def predict(self, control: UnicycleControl, duration: float) -> None:
+        """Move by a control over so many seconds."""
+        ...
+
+
 class GroundVehicle:
     """Unicycle motion, controls and height; see :class:`service.estimator.vehicle.Vehicle`."""
 
@@ -80,12 +88,15 @@ class GroundVehicle:
         """Heed from now on whether the vehicle stands and how far its wheels are to be doubted."""
         self._gait = gait
 
-    def predict(self, belief: ParticleFilter[UnicycleControl], start: int, end: int) -> None:
-        """Move the particles by what the controls say of ``start`` to ``end`` (nanoseconds)."""
+    def predict(self, belief: ParticleFilter[UnicycleControl] | Moved, start: int, end: int) -> None:
+        """Move the particles by what the controls say of ``start`` to ``end`` (nanoseconds).
+
+        A belief that is no set of particles moves by its controls while the vehicle stands, too.
+        """
         duration = (end - start) / SECOND
         if self._gait is not None:
             self._gait.approach(start, end)
-        if self._gait is not None and self._gait.stands:
+        if self._gait is not None and self._gait.stands and isinstance(belief, ParticleFilter):
             turn = self.rolled(start, end).turn
             self.motion.stand(belief.column(GYRO_BIAS), belief.weights, turn, duration)
         else:

@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 
 from filters.belief import Evidence
-from filters.discrete import DenseTransition, DiscreteBayesFilter
+from filters.discrete import DiscreteBayesFilter
 from filters.kalman import Matrix
 from filters.linearised.bank import BATCHED, GaussianBank
 from filters.linearised.interacting import mix
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
+from filters.transition import DenseTransition
 from service.config import Configuration
 from service.estimate import MotionMode
 from service.estimator.ground import GroundVehicle
@@ -35,7 +36,7 @@ from service.estimator.witnesses import gaussian_of
 GENERATOR = np.array(((-0.2, 0.2, 0.0), (0.05, -0.06, 0.01), (0.05, 0.2, -0.25)))
 """Per second: how often still, moving, slipping (rows) turn into each other; a slip lasts some 5 s, each 100 s."""
 
-SLIP = 0.3
+SLIP = 0.2
 """How far wheels that slip are off, as a share of the speed (one standard deviation)."""
 
 GRIP = 1.0
@@ -57,7 +58,7 @@ creeps may stand; the gyro of one that drives straight does."""
 STRETCH = 0.2
 """Seconds of odometry that count as one independent reading."""
 
-SLIPPERY, GRIPPING = 0.5, 0.1
+SLIPPERY, GRIPPING = 0.4, 0.1
 """Probability of slipping from which wheels are doubted, and below which those that slipped are believed again."""
 
 CERTAIN = 0.9
@@ -101,7 +102,7 @@ class Mode:
         self._belief = belief
         self._rolled = rolled
         self._bank = GaussianBank(motion, slow, 2)
-        self._modes = DiscreteBayesFilter[MotionMode](_MODES, np.eye(3), (1 / 3, 1 / 3, 1 / 3))
+        self._modes = DiscreteBayesFilter[MotionMode](_MODES, np.eye(3), (0.5, 0.45, 0.05))
         self._slips = False
         self._bias = 0.0
         self._checked = 0

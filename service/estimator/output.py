@@ -79,6 +79,7 @@ class Output:
                 **figures,
             )
         north, east = pose.mean("north"), pose.mean("east")
+        sampled = math.isfinite(pose.moments.effective_sample_size)
         nn, ne, ee = (float(pose.covariance[i, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
         down, dd, nd, ed = (None, None, None, None) if pose.down is None else pose.down
         heading, heading_variance = (None, None) if pose.heading is None else pose.heading
@@ -94,9 +95,9 @@ class Output:
             longitude=longitude,
             altitude=altitude,
             radius95=pose.radius95,
-            hypotheses=1 if self._tracker is None else self._tracker.count,
-            particles=self._belief.count,
-            effective_sample_size=pose.moments.effective_sample_size,
+            hypotheses=self._tracker.count if sampled and self._tracker is not None else 1,
+            particles=self._belief.count if sampled else 0,
+            effective_sample_size=pose.moments.effective_sample_size if sampled else None,
             biases=self._slow_states(pose.moments),
             **figures,
         )

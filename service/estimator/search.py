@@ -54,9 +54,13 @@ PATIENCE = 3 * SECOND
 LEAST = 4
 """Absolute measurements without which no search is begun."""
 
-DURATION = 1.0
-"""Seconds that a search takes, at any rate of ticks: it is cut into as many pieces as are needed for that."""
-PIECES = 250
+PIECES = 50
+"""Pieces of work in which a search comes, about; it should be done within a second, if the budget allows."""
+
+SHARE = 0.25
+"""Of the budget, that a search may use in a tick,"""
+PIECE_MS = 1.0
+"""with a piece of so many milliseconds. Where a quarter does not suffice for one, one is done all the same."""
 
 FALSE_ALARM = 1e-9
 """Probability with which one search replaces a belief that is right."""
@@ -166,7 +170,8 @@ class Search:
         self._watching = configuration.honesty.recovery
         self._way = way_of(vehicle, configuration, (MEMORY + TRIAL) / SECOND)
         self._heard: deque[Heard] = deque(maxlen=MOST)
-        self._pieces = max(1, math.ceil(PIECES / (DURATION * configuration.loop.rate)))
+        most = int(SHARE * configuration.budget.cpu_ms / PIECE_MS)
+        self._pieces = max(1, min(math.ceil(PIECES / configuration.loop.rate), most))
         self._quest: Quest | None = None
         self._later: list[Heard] = []
         self._rival: Rival | None = None

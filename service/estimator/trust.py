@@ -14,6 +14,7 @@ out two to three seconds after its first great lie, one wrong reading flags nobo
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -57,8 +58,11 @@ wild readings that one lives with for ever. Among ranges they are many, among po
 DOUBT, DOUBT_OF_A_LIAR = 8.0, 5.0
 """Nats: of an innovation that speaks neither way, 4 standard deviations; 3.2 for a group that has been caught."""
 
-LEARNING = 10.0
-"""Seconds of readings that teach as much about the usual errors as one independent reading."""
+LESSON, LEARNING = SECOND, 10.0
+"""A reading in so many nanoseconds teaches what errors are usual, and this many as much as one independent one."""
+
+HINDSIGHT = 45 * SECOND
+"""Readings teach only when they are so old and nobody was caught since: a slow drag is not to pass as usual."""
 
 MARGIN = 4.0
 """Nats by which a witness may be contradicted more than another group's and still accuse."""
@@ -91,6 +95,8 @@ class Judged:
         When, nanoseconds.
     agreed, flagged : bool
         Whether it has ever earned trust, and whether it has lost it.
+    lessons : deque
+        Testimonies that the level has yet to learn from, with their times.
     """
 
     place: int
@@ -100,6 +106,15 @@ class Judged:
     heard: int | None = None
     agreed: bool = False
     flagged: bool = False
+    lessons: deque[tuple[int, Testimony]] = field(default_factory=deque[tuple[int, Testimony]])
+
+    def remember(self, testimony: Testimony, honest: bool) -> None:
+        """Note a testimony of now to learn from later, if it was an honest one, and learn from the ones of long ago."""
+        now = self.heard or 0
+        if honest and (not self.lessons or now - self.lessons[-1][0] >= LESSON):
+            self.lessons.append((now, testimony))
+        while self.lessons and now - self.lessons[0][0] > HINDSIGHT:
+            self.level.learn(*self.lessons.popleft()[1], 1.0 / LEARNING)
 
     def weight(self, time: int) -> float:
         """Return how much of a second has passed since the reading before, at most one, and note this one."""
@@ -266,8 +281,7 @@ class Trust:
     def _judge(self, group: Group, sensor: Judged, testimony: Testimony, weight: float) -> None:
         doubt = DOUBT_OF_A_LIAR if sensor.flagged else DOUBT
         verdict = sensor.level.information(doubt, testimony.noise) - sensor.level.surprise(*testimony)
-        if verdict > 0.0 and not sensor.flagged:
-            sensor.level.learn(*testimony, weight / LEARNING)
+        sensor.remember(testimony, verdict > 0.0 and not sensor.flagged)
         if verdict < 0.0 and not (sensor.agreed and self._accuses(group)):
             return
         self._odds.add(weight * min(BEST, max(sensor.worst, verdict)), sensor.place)
@@ -277,6 +291,7 @@ class Trust:
             sensor.flagged = odds < EARNED
         elif odds <= FLAGGED:
             sensor.flagged = True
+            sensor.lessons.clear()
             group.lie.begin()
             if sensor.absolute:
                 self._look_back(group, sensor.level.caution)

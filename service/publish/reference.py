@@ -71,8 +71,8 @@ ANSWERS = {
     "@rpc/latest": "the last `Estimate`",
     "@rpc/status": "`Status`: the last of everything, the processes, and what the publisher dropped",
     "@rpc/config": "the configuration in force, with all defaults",
-    "@rpc/density": "with `?extractor=` one of `gaussian`, `kmeans`, `histogram`, `tree` or `kernel`: a `Density` of the "
-    "last particle cloud; it takes a second or two",
+    "@rpc/density": "with `?extractor=` one of `gaussian`, `kmeans`, `histogram`, `tree` or `kernel`: "
+    "a `Density` of the last particle cloud; it takes a second or two",
     "@rpc/reinitialize": "begins anew: the payload is JSON as `[start]` has it, "
     '`{"position": [n, e, d], "heading": radians}` or `{"mode": "global"}`; refused with a reason when wrong, '
     'else `{"accepted": true}`, and `reset_counter` steps',

@@ -9,18 +9,12 @@ from enum import Enum
 
 import numpy as np
 import pytest
-import scipy.linalg
 import scipy.sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filters.discrete import (
-    DenseTransition,
-    DiscreteBayesFilter,
-    SparseTransition,
-    transition,
-    transition_over,
-)
+from filters.discrete import DiscreteBayesFilter
+from filters.transition import DenseTransition, SparseTransition, transition_over
 
 STATES = ("a", "b", "c")
 
@@ -156,17 +150,6 @@ def test_it_stays_a_distribution(seed: int, size: int, logs: list[float]) -> Non
         assert belief.belief.sum() == pytest.approx(1.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("duration", [0.0, 1e-6, 0.3, 1.0, 40.0, 1e5])
-def test_continuous_time_equals_the_matrix_exponential(duration: float) -> None:
-    rates = np.array([[7.0, 0.5, 0.0], [0.2, 0.0, 3.0], [0.2, 1.0, -4.0]])
-    generator = rates - np.diag(np.diag(rates))
-    generator -= np.diag(generator.sum(axis=1))
-    expected = scipy.linalg.expm(generator * duration)
-    moving = transition_over(rates, duration)
-    got = np.array([moving.predict(row) for row in np.eye(3)])
-    np.testing.assert_allclose(got, expected, atol=1e-12)
-
-
 def test_continuous_time_does_not_depend_on_how_it_is_cut() -> None:
     rates = np.random.default_rng(1).random((4, 4))
     once = DiscreteBayesFilter(range(4), np.eye(4), [1, 0, 0, 0])
@@ -177,12 +160,6 @@ def test_continuous_time_does_not_depend_on_how_it_is_cut() -> None:
     np.testing.assert_allclose(often.belief, once.belief, rtol=1e-12)
     once.propagate(transition_over(np.zeros((4, 4)), 5.0))
     np.testing.assert_allclose(often.belief, once.belief, rtol=1e-12)
-
-
-def test_triplets_that_occur_twice_add_up() -> None:
-    twice = SparseTransition(2, [0, 0, 1], [1, 1, 1], [0.4, 0.6, 1.0])
-    assert twice.predict(np.array([1.0, 0.0])).tolist() == [0.0, 1.0]
-    assert twice.size == DenseTransition(np.eye(2)).size == 2
 
 
 def test_whatever_predicts_is_a_transition() -> None:
@@ -210,18 +187,6 @@ GOOD = np.eye(3)
         (lambda: DiscreteBayesFilter(STATES, GOOD, [1.0, 0.0]), "one number for each of 3"),
         (lambda: DiscreteBayesFilter(STATES, GOOD, [0.0, 0.0, 0.0]), "must be positive"),
         (lambda: DiscreteBayesFilter(STATES, GOOD, [1.0, -1.0, 1.0]), "not negative, got -1.0 at 1"),
-        (lambda: transition(np.ones((2, 3))), "square"),
-        (lambda: transition(scipy.sparse.coo_array(np.ones((2, 3)))), "square"),
-        (lambda: transition([[math.nan, 1.0], [0.0, 1.0]]), "finite"),
-        (lambda: SparseTransition(2, [0, 1], [0], [1.0]), "one length"),
-        (lambda: SparseTransition(2, [0, 2], [0, 1], [1.0, 1.0]), "0 to 1"),
-        (lambda: SparseTransition(2, [0, 1], [0, -1], [1.0, 1.0]), "0 to 1"),
-        (lambda: SparseTransition(2, [0.0, 1.0], [0, 1], [1.0, 1.0]), "whole numbers"),
-        (lambda: SparseTransition(2, [0, 1], [0, 1], [1.5, 1.0]), "sum to one"),
-        (lambda: SparseTransition(2, [0, 0, 1], [0, 1, 1], [1.5, -0.5, 1.0]), "not negative"),
-        (lambda: transition_over([[0.0, -1.0], [0.0, 0.0]], 1.0), "not negative"),
-        (lambda: transition_over([[0.0, 1.0]], 1.0), "square"),
-        (lambda: transition_over([[0.0]], math.inf), "duration"),
     ],
 )
 def test_what_makes_no_sense_is_refused(make: Callable[[], object], what: str) -> None:

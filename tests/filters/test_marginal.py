@@ -14,7 +14,8 @@ from scipy import stats
 
 from filters.kalman import KalmanFilter
 from filters.kernels.compile import Float32Array
-from filters.marginal import MarginalFilter, MixedMotion, MixedObservation, MixedStep, draw
+from filters.marginal import MarginalFilter, draw
+from filters.mixed import MixedMotion, MixedObservation, MixedStep
 from filters.motion import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from filters.particle_set import ParticleSet
@@ -437,8 +438,8 @@ def test_what_a_sensor_refuses_changes_nothing() -> None:
     ("columns", "covariance", "match"),
     [
         ({"position": [0.0], "velocity": 0.0}, np.eye(2), "columns must be"),
-        ({"position": 0.0, "velocity": 0.0, "acceleration": 0.0}, np.eye(2), "capacity"),
-        ({"position": np.zeros(11), "velocity": 0.0, "acceleration": 0.0}, np.eye(2), "capacity"),
+        ({"position": 0.0, "velocity": 0.0, "acceleration": 0.0}, np.eye(2), "one-dimensional"),
+        ({"position": np.zeros(11), "velocity": 0.0, "acceleration": 0.0}, np.eye(2), "1 to 10 particles"),
         ({"position": [math.nan], "velocity": 0.0, "acceleration": 0.0}, np.eye(2), "finite"),
         ({"position": [0.0], "velocity": 0.0, "acceleration": 0.0}, np.eye(3), "covariance"),
     ],

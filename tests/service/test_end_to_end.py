@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+import zenoh
 
 SCRIPTS = Path(__file__).parent / "standins"
 ROOT = Path(__file__).parents[2]
@@ -108,6 +109,16 @@ class Vehicle:
         assert process.stdout is not None
         assert process.stdout.readline() == "subscribed\n"
         threading.Thread(target=self._read, args=(process.stdout,), daemon=True).start()
+
+    def ask(self, query: str, payload: str) -> Any:
+        """Send a query and return what is answered."""
+        configuration = zenoh.Config.from_json5(
+            json.dumps({"mode": "client", "connect": {"endpoints": [self.endpoint]}})
+        )
+        with zenoh.open(configuration) as session:
+            (reply,) = session.get(f"beliefd/v1/rover/{query}", payload=payload, timeout=10.0)
+            assert reply.ok is not None, reply.err and reply.err.payload.to_string()
+            return json.loads(reply.ok.payload.to_string())
 
     def _read(self, lines: Iterator[str]) -> None:
         for line in lines:
@@ -224,7 +235,7 @@ def test_a_kill_in_flight_is_survived_by_all(vehicle: Vehicle) -> None:
     vehicle.drive("autopilot", seconds=120.0)
     vehicle.wait("estimate", lambda value: value["position"][0] is not None)
     before = children(daemon.pid)
-    assert set(before) == {"loop", "publisher", "link autopilot", "link radio"}
+    assert set(before) == {"loop", "publisher", "keeper", "link autopilot", "link radio"}
     for role in ("link autopilot", "loop"):
         os.kill(before[role], signal.SIGKILL)
         killed = time.monotonic()
@@ -240,3 +251,37 @@ def test_a_kill_in_flight_is_survived_by_all(vehicle: Vehicle) -> None:
     os.kill(after["publisher"], signal.SIGKILL)
     killed = time.monotonic()
     vehicle.wait("estimate", lambda value: value["monotonic_ns"] * 1e-9 > killed + 1.0)
+
+
+def test_a_loop_that_was_killed_goes_on_from_its_checkpoint(
+    vehicle: Vehicle, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Told to begin 50 m north, driven, killed: the next loop goes on there, wider, and not where [start] says.
+
+    3 s are asked for; 20 are granted to a busy machine.
+    """
+    daemon = vehicle.start_daemon()
+    vehicle.subscribe()
+    vehicle.wait("estimate", lambda _: True)
+    asked = json.dumps({"position": [50.0, 0.0, 0.0], "heading": 0.0})
+    vehicle.ask("@rpc/reinitialize", asked)
+    told = vehicle.wait("estimate", lambda value: value["reset_counter"] == 1).value
+    assert told["position"][0] == pytest.approx(50.0, abs=2.0)
+    checkpoint = vehicle.folder / "rover.checkpoint"
+    until = time.monotonic() + PATIENCE
+    while not checkpoint.exists():
+        assert time.monotonic() < until, "no checkpoint"
+        time.sleep(0.05)
+    before = vehicle.wait("estimate", lambda _: True).value
+    loop = children(daemon.pid)["loop"]
+    os.kill(loop, signal.SIGKILL)
+    killed = time.monotonic()
+    back = vehicle.wait(
+        "estimate", lambda value: value["sequence"] < before["sequence"] and value["position"][0] is not None
+    )
+    with capsys.disabled():
+        sys.stdout.write(f"\nkilled to the first estimate: {back.seconds - killed:.3f} s\n")
+    assert back.seconds - killed < 20.0
+    assert back.value["position"][0] == pytest.approx(50.0, abs=15.0)
+    assert back.value["radius95"] > before["radius95"] + 1.0
+    assert back.value["reset_counter"] == 1

@@ -270,6 +270,46 @@ def test_what_is_not_measured_any_more_is_tried_again() -> None:
     assert levels[-1] <= Level.FEWER_PARTICLES
 
 
+@pytest.mark.parametrize(
+    ("cost", "level", "most"),
+    [
+        (Shape(0.4e-3, 0.2e-3), Level.KALMAN, 5),  # twice its shape until it is known: (3 ms - 0.8) / 0.4
+        (Shape(0.4e-3, 1.2e-3), Level.PREDICTION_ONLY, 0),  # 0.8 + 2.4 ms do not go into 3
+    ],
+)
+def test_a_kalman_filter_takes_over_where_it_fits_and_particles_do_not(
+    cost: Shape, level: Level, most: int
+) -> None:
+    """Closed form: 4 ms less 1 ms fixed; with the fewest particles one measurement costs 3.5."""
+    shapes = {"sensing": Shape(1e-4, 1e-7), "kalman": cost}
+    governor, vehicle = Governor(BUDGET, SMALLEST, LARGEST, shapes, 1.0), Vehicle(1e-3, 0.1e-3, 3.5e-3)
+    decisions = [vehicle.tick(governor)[0] for _ in range(6)]
+    assert (decisions[-1].level, decisions[-1].most) == (level, most)
+
+
+def test_a_kalman_filter_hands_back_when_particles_have_become_cheap() -> None:
+    """While it speaks nothing tells what particles cost: what is remembered fades, and within 500 ticks they are back.
+
+    It takes 10 µs and what it measures of itself is twice its shape, so it always fits.
+    """
+    cost = Shape(5e-6, 5e-6)
+    governor = Governor(BUDGET, SMALLEST, LARGEST, {"sensing": Shape(1e-4, 1e-7), "kalman": cost}, 1.0)
+    vehicle = Vehicle(1e-3, 0.1e-3, 3.5e-3)
+    vehicle.run(governor, 10)
+    levels: list[Level] = []
+    for _ in range(500):
+        decision = governor.decide(5_000)
+        levels.append(decision.level)
+        if decision.level is Level.KALMAN:
+            governor.observe_deputy(2.0 * cost.at(20), 20)
+        else:
+            governor.observe("sensing", 20 * 0.01e-3, decision.count)
+            governor.observe_measurement(0.01e-3, decision.count)
+    assert levels[0] is Level.KALMAN
+    assert levels[-1] <= Level.FEWER_PARTICLES
+    assert sum(a != b for a, b in pairwise(levels)) <= 4  # it does not hunt
+
+
 def test_tries_in_vain_seldom() -> None:
     """A measurement that costs ten budgets: at most one tick in fifty overruns for the sake of trying."""
     vehicle, governor = Vehicle(1e-3, 0.1e-3, 10 * BUDGET), only_sensing()

@@ -42,7 +42,7 @@ def test_every_stage_is_run_and_has_a_shape(tmp_path: Path, most: int) -> None:
     path = tmp_path / "rover.toml"
     path.write_text(TOML.format(most=most))
     shapes = rehearse(load(path))
-    assert set(shapes) == set(PARTICLE_STAGES)
+    assert set(shapes) == {*PARTICLE_STAGES, "kalman"}
     assert all(shape.per_particle > 0.0 and shape.overhead >= 0.0 for shape in shapes.values())
 
 

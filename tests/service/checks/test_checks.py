@@ -9,7 +9,7 @@ import pytest
 
 from service.checks import Story, Teller, judge, read_events
 from service.checks.check import Check
-from service.estimate import Estimate, HealthState, SensorStatus
+from service.estimate import Estimate, HealthState, MotionMode, SensorStatus
 from tests.service.checks.runs import BEGIN, answers, seconds, told
 
 
@@ -193,7 +193,10 @@ def test_a_run_is_told_with_its_flags_resets_and_seconds_in_each_health() -> Non
         health = HealthState.LOST if index == 3 else HealthState.TRACKING
         teller.add(
             estimate(
-                time, health=health, reset_counter=int(index > 3), reason="wheels slip" if index == 5 else ""
+                time,
+                health=health,
+                reset_counter=int(index > 3),
+                mode=MotionMode.SLIPPING if index == 5 else MotionMode.MOVING,
             )
         )
         assert teller.due(time)

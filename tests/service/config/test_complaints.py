@@ -131,7 +131,11 @@ SINGLE = [
         "unicycl",
         "vehicle, motion: needs one of constant_velocity, unicycle, drift, inertial, got",
     ),
-    ("vehicle.motion", "drift", 'vehicle, motion: "drift" is not in this version, which has: constant_velocity, unicycle'),
+    (
+        "vehicle.motion",
+        "drift",
+        'vehicle, motion: "drift" is not in this version, which has: constant_velocity, unicycle',
+    ),
     (
         "start.mode",
         "given!",
@@ -193,6 +197,15 @@ def test_each_error_says_where_what_and_what_would_be_right(place: str, value: o
     assert len(found) == 1, found
     assert found[0].startswith("robot.toml: ")
     assert expected in found[0]
+
+
+@pytest.mark.parametrize("kind", ["heading", "velocity"])
+def test_a_tag_has_no_heading_to_measure(kind: str) -> None:
+    tag = placed(whole(), "vehicle.motion", "constant_velocity")
+    assert complaints(placed(tag, "sensor", [{"kind": "position"}, {"kind": "range"}])) == []
+    found = complaints(placed(tag, "sensor", [{"kind": "range"}, {"kind": kind}]))
+    assert len(found) == 1
+    assert f'sensor 2 ({kind}), kind: "{kind}" needs a heading' in found[0]
 
 
 def test_the_whole_file_has_no_error() -> None:
