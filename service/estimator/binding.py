@@ -122,6 +122,6 @@ class BoundSensor:
 
     def _count_repeats(self, time: int) -> None:
         """Note how many readings share one independent error, from the interval to the one before."""
-        interval = max(SHORTEST_INTERVAL, abs(time - self._last_time) / SECOND)
+        interval = max(SHORTEST_INTERVAL, (time - self._last_time) / SECOND)
         self._last_time = time
         self._repeats = max(1.0, self._correlation / interval)

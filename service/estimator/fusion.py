@@ -11,7 +11,7 @@ from typing import Any
 from filters.particle import ParticleFilter
 from service.estimator.binding import Measurement, Place, Refusal
 from service.estimator.companion import Companion
-from service.estimator.course import Course
+from service.estimator.course import Course, Level
 from service.estimator.deputy import Deputy
 from service.estimator.intake import Intake, Passed, Waiting
 from service.estimator.latecomers import Latecomers
