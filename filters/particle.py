@@ -46,6 +46,9 @@ _RESAMPLING_STREAM = 1 << 32
 _INJECTION_STREAM = 2 << 32
 _KERNEL_STREAM = 3 << 32
 
+NOBODY = -1
+"""Ancestor of a particle that was injected."""
+
 _REFUSED = Evidence(math.nan, math.nan, accepted=False)
 
 
@@ -134,6 +137,7 @@ class ParticleFilter(Generic[Control]):
         self._redraw = resampling.redraw.direct
         self._log_sum = 0.0
         self._total = self._squares = 0.0
+        self._lineage: Int32Array | None = None
         self._centre_values: dict[str, float] = {}
         self._weighed = False
 
@@ -280,6 +284,48 @@ class ParticleFilter(Generic[Control]):
         # as the constructor makes it, without its call in Python
         return tuple.__new__(Evidence, (log_mean, innovation, True))
 
+    def weigh_past(
+        self, sensor: Sensor[M], measurement: M, past: ParticleSet, known: NDArray[np.bool_]
+    ) -> Evidence:
+        """Line 5 for a measurement of an earlier time: a particle is the end of a path (eq. 4.30).
+
+        Parameters
+        ----------
+        past : ParticleSet
+            Every particle as it was then, in the order of now; its ``log_weights`` are written.
+        known : (count,) bool
+            Whose path reaches back so far. The others keep their share of the belief.
+
+        Raises
+        ------
+        ValueError
+            The measurement is not finite; the weights are untouched then.
+        """
+        if not all(map(isfinite, filter(None, measurement))):
+            raise ValueError(f"{type(sensor).__name__}: a measurement must be finite, got {measurement}")
+        if sensor.refusal(measurement) is not None or not known.any():
+            return _REFUSED
+        innovation = sensor.innovation(self._centre_values or self._centre_state(), measurement)
+        gain = past.log_weights[: self.count]
+        gain[:] = 0.0
+        constant = sensor.weigh(past, 0, self.count, measurement)
+        held = self.weights[known].astype(np.float64)
+        mean = float(np.exp(gain[known], dtype=np.float64) @ held / held.sum())
+        if mean <= 0.0:
+            return _REFUSED
+        gain[~known] = math.log(mean)
+        log_weights = self._particles.log_weights
+        log_weights[: self.count] += gain
+        self._log_sum = self._log_sum_of(log_weights, self._sampled, self._stride, self._sample)
+        self._weighed = True
+        return Evidence(constant + math.log(mean), innovation, True)
+
+    def follow(self, lineage: Int32Array) -> None:
+        """Have ``lineage``, (capacity,) int32, laid out with the copies at every resampling, as a column would be."""
+        if lineage.shape != (self.capacity,):
+            raise ValueError(f"follow: {self.capacity} numbers are needed, got {lineage.shape}")
+        self._lineage = lineage
+
     def _share_weighing(self, sensor: Sensor[M], measurement: M) -> float:
         constants = [0.0] * self._blocks.threads
 
@@ -396,11 +442,13 @@ class ParticleFilter(Generic[Control]):
             self._redraw(columns, spare, self._weights, logs, sources, ancestors, bounds, uniform)
             particles.columns, self._spare = spare, columns
             self._forget_sums()
+            self._lay_out_lineage(sources, ancestors)
             return
         if scheme is systematic:  # whose checks these weights do not need
             given = self._weights[:sources]
             resampling.systematic(given, resampling.total(given), uniform, ancestors)
         self._lay_out(ancestors)
+        self._lay_out_lineage(sources, ancestors)
         self._level()
 
     def resample_by_label(self, labels: Int32Array, quotas: NDArray[np.int64]) -> None:
@@ -437,6 +485,7 @@ class ParticleFilter(Generic[Control]):
         self._draws += 1
         self._lay_out(ancestors)
         self._lay_out_labels(before, labels, ancestors)
+        self._lay_out_lineage(before.size, ancestors)
         self._level()
         log_weights = self._particles.log_weights
         log_weights[:target] = worth[labels[:target]]
@@ -453,6 +502,10 @@ class ParticleFilter(Generic[Control]):
 
         blocks.split(-(-ancestors.size // resampling.RUN), ALIGNMENT, act)
         self._particles.columns, self._spare = spare, columns
+
+    def _lay_out_lineage(self, sources: int, ancestors: Int32Array) -> None:
+        if self._lineage is not None:
+            self._lay_out_labels(self._lineage[:sources].copy(), self._lineage, ancestors)
 
     def _lay_out_labels(self, before: Int32Array, labels: Int32Array, ancestors: Int32Array) -> None:
         """Do the same with a whole number for each; copying looks at no bit, so they may pass for float32."""
@@ -495,6 +548,8 @@ class ParticleFilter(Generic[Control]):
         places = ((np.arange(injected) + offset) * (target / injected)).astype(np.int64)
         for name, column in given.items():
             self._particles.columns[self._particles.rows[name], places] = column
+        if self._lineage is not None:
+            self._lineage[places] = NOBODY
 
     def resample_regularized(
         self, names: Sequence[str], rule: Rule, count: int | None = None, scheme: Resampler = systematic

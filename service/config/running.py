@@ -17,6 +17,10 @@ class Loop(Section):
     """Ticks per second."""
     horizon_ms: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=5000)] = 250.0
     """How far the filter stays behind now, ms, so that late samples come in order: the slowest sensor."""
+    late_s: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=600)] = 30.0
+    """How much later than the horizon a measurement may come and still be fused, by where every particle was then, s.
+
+    It needs odometry. 0: what is late is only counted."""
     priority: Annotated[Whole, Field(ge=0, le=99)] = 0
     """SCHED_FIFO priority; 0: ordinary scheduling."""
     cpus: tuple[Annotated[Whole, Field(ge=0, le=1023)], ...] = ()

@@ -28,6 +28,7 @@ from service.estimator.deputy import Deputy
 from service.estimator.fusion import KALMAN, Fusion
 from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
+from service.estimator.latecomers import latecomers_of
 from service.estimator.mode import mode_of
 from service.estimator.output import Output
 from service.estimator.population import Population
@@ -100,6 +101,11 @@ class Estimator:
         if self._trust is not None:
             self._fusion.trust = self._trust
             self._fusion.companions.append(self._trust)
+        latecomers = latecomers_of(configuration, self._vehicle, self._filter)
+        if latecomers is not None:
+            self._intake.latecomers = self._fusion.latecomers = latecomers
+            self._fusion.companions.append(latecomers)
+        self._late = 0 if latecomers is None else latecomers.stretch
         self._deputy = Deputy(self._vehicle, self._filter, seed)
         self._fusion.deputy = self._deputy
         self._fusion.companions.append(self._deputy)
@@ -193,7 +199,7 @@ class Estimator:
             passed = self._begin(horizon, passed, afforded)
         if self._fusion.time is not None:
             self._move(now, horizon, passed, afforded, course)
-        oldest = horizon if self._fusion.time is None else self._fusion.time
+        oldest = horizon if self._fusion.time is None else self._fusion.time - self._late
         self._vehicle.controls.forget(oldest - SECOND)
         estimate = self._spoken = self._speak(now, unix, afforded, course)
         self._sequence += 1
@@ -221,6 +227,7 @@ class Estimator:
         taken_back = self._fusion.taken_back
         self._fusion.fuse(passed, afforded, course)
         self._fusion.keep_up(horizon)
+        self._fusion.catch_up(afforded, course)
         self.reset_counter += self._fusion.taken_back - taken_back
         self._find(afforded)
         if self._deputy.speaking:
@@ -300,6 +307,11 @@ class Estimator:
     def missing(self) -> list[str]:
         """What the belief waits for, in the user's words."""
         return [*self._vehicle.missing, *self._intake.missing]
+
+    @property
+    def caught_up(self) -> int:
+        """How many measurements came late and were fused all the same."""
+        return self._intake.caught_up
 
     @property
     def drops(self) -> dict[str, int]:

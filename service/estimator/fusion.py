@@ -11,9 +11,10 @@ from typing import Any
 from filters.particle import ParticleFilter
 from service.estimator.binding import Measurement, Place, Refusal
 from service.estimator.companion import Companion
-from service.estimator.course import Course
+from service.estimator.course import Course, Level
 from service.estimator.deputy import Deputy
 from service.estimator.intake import Intake, Passed, Waiting
+from service.estimator.latecomers import Latecomers
 from service.estimator.population import Population
 from service.estimator.records import SensorRecord
 from service.estimator.search import Search
@@ -70,6 +71,8 @@ class Fusion:
         Takes the measurements instead of the belief while that has no place.
     trust : Trust or None
         Asked before each measurement whether its sensor is believed; a companion, too.
+    latecomers : Latecomers or None
+        Who weighs the belief by measurements that come after the horizon has passed them.
     taken_back : int
         How often the belief began anew because a sensor had led it away.
     """
@@ -89,6 +92,7 @@ class Fusion:
         self.search: Search | None = None
         self.trust: Trust | None = None
         self.taken_back = 0
+        self.latecomers: Latecomers | None = None
         self._vehicle = vehicle
         self._belief = belief
         self._population = population
@@ -139,6 +143,37 @@ class Fusion:
     def _resample_if_worn(self, afforded: int) -> None:
         if not self._deputised:
             self._population.resample_if_worn(afforded)
+
+    def catch_up(self, afforded: int, course: Course) -> None:
+        """Take measurements that came too late to be taken in order, as many as the tick has time for."""
+        if self.latecomers is None or self.time is None or course.level >= Level.THINNED:
+            return
+        due = self.latecomers.due()
+        for time, waiting in due:
+            self._weigh_late(self.latecomers, time, waiting)
+            self._population.resample_if_worn(afforded)
+        if due:
+            self._stopwatch.lap("sensing")
+        self.latecomers.keep(self.time)
+
+    def _weigh_late(self, latecomers: Latecomers, time: int, waiting: Waiting) -> None:
+        assert self.time is not None
+        place = Place(time, self._intake.frame, self._vehicle.down, self._vehicle.controls)
+        measured = waiting.sensor.measure(waiting.sample, place)
+        record = self._intake.records.of(measured.name)
+        if isinstance(measured, Refusal):
+            record.refused[measured.reason] += 1
+            return
+        if self.trust is not None and (self.trust.log_odds(measured.name) or 0.0) < 0.0:
+            record.refused["distrusted"] += 1
+            return
+        evidence = latecomers.weigh(time, self.time, measured)
+        if evidence is None or not evidence.accepted:
+            record.refused["late" if evidence is None else "invalid"] += 1
+        elif measured.surprise(evidence.log_mean) > OUTLIER:
+            record.refused["outlier"] += 1
+        else:
+            record.accepted += 1
 
     def keep_up(self, horizon: int) -> None:
         """Move the belief to ``horizon`` where no measurement has brought it near."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from drivers.plausibility import implausible
 from drivers.sample import Origin, Sample
@@ -18,6 +18,9 @@ from service.estimator.controls import Controls
 from service.estimator.records import SensorRecords
 from service.geodesy import Geodetic, LocalFrame
 from service.timeline import FUTURE_TOLERANCE, Timeline
+
+if TYPE_CHECKING:
+    from service.estimator.latecomers import Latecomers
 
 
 class Waiting(NamedTuple):
@@ -47,6 +50,10 @@ class Intake:
         The local frame, configured or learned; ``None`` until then.
     records : SensorRecords
         What became of each sensor's readings.
+    latecomers : Latecomers or None
+        Who takes measurements that the horizon has passed.
+    caught_up : int
+        How many of them were taken.
     dropped : Counter[str]
         What came and was not used, by reason.
     """
@@ -56,6 +63,8 @@ class Intake:
         self.records = SensorRecords()
         self.dropped: Counter[str] = Counter()
         self.frame = _configured_frame(configuration)
+        self.latecomers: Latecomers | None = None
+        self.caught_up = 0
         self._controls = controls
         self._sensors = [BoundSensor(sensor, surroundings) for sensor in configuration.sensor]
         self._timeline: Timeline[Waiting] = Timeline()
@@ -110,6 +119,7 @@ class Intake:
     def drops(self) -> dict[str, int]:
         """What came and was not used, since the start."""
         counts = self.dropped + self._timeline.refused
+        counts["late"] -= self.caught_up
         counts["control out of order"] = self._controls.out_of_order
         counts["control implausible"] = self._controls.implausible
         return {what: count for what, count in counts.items() if count}
@@ -144,6 +154,11 @@ class Intake:
             return
         self._heard.add(sensor.title)
         reason = self._timeline.insert(Waiting(sensor, sample), sample.time - sensor.delay, sample.received)
+        if reason == "late" and self.latecomers is not None:
+            reason = (
+                None if self.latecomers.take(sample.time - sensor.delay, Waiting(sensor, sample)) else "late"
+            )
+            self.caught_up += reason is None
         if reason is not None:
             record.refused[reason] += 1
 

@@ -233,7 +233,7 @@ def _run(
     now: int,
 ) -> Run:
     drops, compared = estimator.drops, tally.path.compared(plan.truth)
-    late = drops.pop("late", 0)
+    late = drops.pop("late", 0) + estimator.caught_up
     last = tally.last
     return Run(
         seed=seed,

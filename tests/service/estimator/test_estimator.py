@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -155,8 +156,31 @@ def test_order_of_arrival_does_not_matter_within_the_horizon() -> None:
     assert ordered_last.position == shuffled_last.position
 
 
+def test_what_comes_seconds_late_is_fused_where_the_particles_were() -> None:
+    """Ranges of the first four seconds come at the fifth: the belief then knows nearly what it knew with them in order.
+
+    Without them it has only what wheels and gyro say of a start that was told with 0.5 m.
+    """
+    samples = ranged_drive(5, 8)
+    held = [
+        msgspec.structs.replace(s, received=5 * SECOND)
+        if isinstance(s.reading, Range) and s.time < 4 * SECOND
+        else s
+        for s in samples
+        if not isinstance(s.reading, Range) or s.time < 4 * SECOND
+    ]
+    late, never = Estimator(configuration()), Estimator(configuration(loop={"late_s": 0.0}))
+    fused, blind = list(run(late, held, 8))[-1], list(run(never, held, 8))[-1]
+    counts = {status.name: status for status in late.sensors(8 * SECOND)}
+    assert late.caught_up >= 15
+    assert late.drops.get("late", 0) == 0
+    assert sum(status.accepted for status in counts.values()) >= 0.9 * late.caught_up
+    assert never.drops["late"] == late.caught_up
+    assert fused.radius95 < 0.6 * blind.radius95
+
+
 def test_late_and_future_samples_are_counted_and_harmless() -> None:
-    estimator = Estimator(configuration())
+    estimator = Estimator(configuration(loop={"late_s": 0.0}))
     good = list(run(estimator, ranged_drive(5, 6), 6))[-1]
     drive = Drive(0)
     late = drive.range_to(1.0, 1)
