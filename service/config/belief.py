@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from service.config.section import (
+    Flag,
     Interval,
     Latitude,
     Longitude,
@@ -174,6 +175,8 @@ class Sensor(Section):
     """Only readings that the wire names so (GPS2_RAW, gnss.Fix2, sample/uwb); without it: any."""
     sigma: Positive | None = None
     """Standard deviation of an honest reading: m, m/s or rad. Without it: what the reading itself says."""
+    claims: Flag = True
+    """Whether what a reading says of its own standard deviation counts where it is more than sigma."""
     outliers: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=1)] = 0.05
     """Share of readings that mean nothing."""
     estimate: tuple[SlowState, ...] = ()

@@ -109,7 +109,8 @@ class BoundSensor:
 
     def sigma(self, claimed: float | None) -> float:
         """Return the larger of what the configuration and the reading say; each knows of errors the other does not."""
-        known = [value for value in (self.settings.sigma, claimed) if value is not None and value > 0]
+        said = claimed if self.settings.claims else None
+        known = [value for value in (self.settings.sigma, said) if value is not None and value > 0]
         return max(self._kind.least_sigma, max(known, default=self._kind.default_sigma))
 
     def spread(self, claimed: float | None, place: Place) -> float:
@@ -122,6 +123,6 @@ class BoundSensor:
 
     def _count_repeats(self, time: int) -> None:
         """Note how many readings share one independent error, from the interval to the one before."""
-        interval = max(SHORTEST_INTERVAL, (time - self._last_time) / SECOND)
+        interval = max(SHORTEST_INTERVAL, abs(time - self._last_time) / SECOND)
         self._last_time = time
         self._repeats = max(1.0, self._correlation / interval)

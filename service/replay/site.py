@@ -40,6 +40,7 @@ from service.config import (
     load,
     site,
 )
+from service.replay.scatter import RangeScatter
 from service.replay.sources import kind_of, merged, open_log
 from service.replay.surroundings import area_about, beacons_of
 
@@ -69,7 +70,7 @@ _ODOMETRY = frozenset({Odometer, Speed, MotionCommand})
 """What tells how far the vehicle went; without any of it a motion model with a heading has nothing to go by, and a
 receiver's delay does not show."""
 
-_POINTING = frozenset({"velocity", "heading"})
+_POINTING = frozenset({"velocity", "heading", "bearing", "range_bearing"})
 """Kinds that speak of a heading, which a tag has not."""
 
 SHORTEST_HORIZON_MS = 50.0
@@ -169,6 +170,8 @@ def _filled(partial: Site, logs: tuple[Path, ...], notes: list[str]) -> Configur
             words += f", delay_ms = {sensor.delay_ms:.0f}"
             words += ", correlation_s = 0" if sensor.correlation_s == 0.0 else ""
             words += " (SIM_STATE seen: ArduPilot's simulator)"
+        if not sensor.claims:
+            words += f", sigma = {sensor.sigma:g} and claims = false (they scatter less than they claim)"
         notes.append(words + ("".join(f', estimate = ["{state}"]' for state in sensor.estimate)))
     filled = _placed(partial, partial.configuration(vehicle, links, sensors), contents, notes)
     if contents.simulated and contents.rover and "motion" not in partial.model_fields_set:
@@ -215,6 +218,8 @@ class Contents(NamedTuple):
         What was said of the beacons' places.
     ranges : list[float]
         Every distance to a beacon that was heard, metres.
+    range_sigma : float or None
+        What a range is worth, metres, if that is less than it claims.
     """
 
     heard: set[type]
@@ -223,6 +228,7 @@ class Contents(NamedTuple):
     horizon_ms: float
     places: list[BeaconPlace]
     ranges: list[float]
+    range_sigma: float | None
 
 
 def _contents_of(configuration: Configuration, logs: tuple[Path, ...]) -> Contents:
@@ -231,6 +237,7 @@ def _contents_of(configuration: Configuration, logs: tuple[Path, ...]) -> Conten
     latencies: list[int] = []
     places: dict[int, BeaconPlace] = {}
     ranges: list[float] = []
+    scatter = RangeScatter()
     rover = False
     for sample in merged(readers):
         reading = sample.reading
@@ -242,11 +249,12 @@ def _contents_of(configuration: Configuration, logs: tuple[Path, ...]) -> Conten
             places.setdefault(reading.beacon, reading)
         elif isinstance(reading, Range):
             ranges.append(reading.distance)
+            scatter.add(sample.time, reading)
         if kind in _MEASURED:
             latencies.append(sample.received - sample.time)
     simulated = any("SIM_STATE" in reader.kinds() for reader in readers)
     horizon_ms = _horizon_for(latencies, SITL_GNSS_DELAY_MS if simulated else 0.0)
-    return Contents(heard, simulated, rover, horizon_ms, list(places.values()), ranges)
+    return Contents(heard, simulated, rover, horizon_ms, list(places.values()), ranges, scatter.sigma())
 
 
 def _horizon_for(latencies: list[int], delay_ms: float) -> float:
@@ -284,7 +292,8 @@ def _sensors_of(
 def _facts_of(kind: str, contents: Contents, free: bool) -> dict[str, Any]:
     """Return what is filled in for a sensor beside its kind."""
     if kind == "range" and free:
-        return {"estimate": ("bias",), "bias_sigma": RADIO_BIAS}
+        worth = {} if contents.range_sigma is None else {"sigma": contents.range_sigma, "claims": False}
+        return {"estimate": ("bias",), "bias_sigma": RADIO_BIAS} | worth
     if kind == "range":
         return {"estimate": ("scale",)}
     if kind in ("position", "velocity"):

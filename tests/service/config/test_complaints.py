@@ -202,7 +202,7 @@ def test_each_error_says_where_what_and_what_would_be_right(place: str, value: o
 @pytest.mark.parametrize("kind", ["heading", "velocity"])
 def test_a_tag_has_no_heading_to_measure(kind: str) -> None:
     tag = placed(whole(), "vehicle.motion", "constant_velocity")
-    assert complaints(placed(tag, "sensor", [{"kind": "position"}, {"kind": "range"}])) == []
+    validated(placed(tag, "sensor", [{"kind": "position"}, {"kind": "range"}]), Configuration, "robot.toml")
     found = complaints(placed(tag, "sensor", [{"kind": "range"}, {"kind": kind}]))
     assert len(found) == 1
     assert f'sensor 2 ({kind}), kind: "{kind}" needs a heading' in found[0]
