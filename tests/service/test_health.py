@@ -146,3 +146,18 @@ def test_a_restart_forgets() -> None:
     agreeing(monitor, 0, 8, surprise=1.0)
     monitor.restart()
     assert monitor.judge(facts(9)) is HealthState.DEAD_RECKONING
+
+
+def test_is_ambiguous_as_long_as_several_places_count() -> None:
+    """It goes before dead reckoning, and after a loss: a belief that no measurement fits is not merely ambiguous."""
+    monitor, several = HealthMonitor(), "2 hypotheses, 61 % and 39 %, 14 m apart"
+    now = agreeing(monitor, 0, 2)
+    assert monitor.judge(replace(facts(now, 15.0), ambiguity=several)) is HealthState.AMBIGUOUS
+    assert monitor.reason == several
+    silent = replace(facts(now + 10.0, 15.0), ambiguity=several)
+    assert monitor.judge(silent) is HealthState.AMBIGUOUS
+    assert several in monitor.reason
+    assert "no absolute measurement" in monitor.reason
+    assert monitor.judge(facts(now)) is HealthState.TRACKING
+    now = agreeing(monitor, now, 6, surprise=1.0)
+    assert monitor.judge(replace(facts(now), ambiguity=several)) is HealthState.LOST
