@@ -168,7 +168,15 @@ def test_every_option_named_exists() -> None:
             check=True,
             env={"TERM": "dumb", "COLUMNS": "200"},
         ).stdout
-        for words in ([], ["run"], ["replay"], ["textbook"], ["service", "install"], ["service", "uninstall"])
+        for words in (
+            [],
+            ["run"],
+            ["replay"],
+            ["scenario"],
+            ["textbook"],
+            ["service", "install"],
+            ["service", "uninstall"],
+        )
     ]
     simulator = subprocess.run(
         [sys.executable, "-m", "sim_vehicle", "--help"], capture_output=True, text=True, check=True, cwd=ROOT
