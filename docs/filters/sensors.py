@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from filters.particle_set import ParticleSet
-from filters.sensing import Range, RangeMeasurement
+from filters.sensing import Range, RangeBearing, RangeBearingMeasurement, RangeMeasurement
 from service.textbook.style import BLUE, GREY, ORANGE
 
 RANGE_SIGMA = 0.5
@@ -32,4 +32,24 @@ def outlier() -> Figure:
     return figure
 
 
-FIGURES = {"outlier": outlier}
+def landmarks() -> Figure:
+    """Likelihood of the place by one sight without a name, the heading being known."""
+    places = np.array([(6.0, 6.0), (-6.0, 2.0), (2.0, -8.0)])
+    axis_values = np.linspace(-16.0, 16.0, 81)
+    east, north = np.meshgrid(axis_values, axis_values)
+    particles = ParticleSet(("north", "east", "heading"), north.size)
+    particles.count = north.size
+    particles.columns[0], particles.columns[1] = north.ravel(), east.ravel()
+    sensor = RangeBearing(0.5, 0.15, landmarks=places)
+    sensor.weigh(particles, 0, particles.count, RangeBearingMeasurement(8.0, 0.4))
+    figure, axis = plt.subplots(figsize=(4.6, 4.2), layout="constrained")
+    shown = np.exp(particles.log_weights[: north.size].reshape(north.shape))
+    axis.contourf(east, north, shown / shown.max(), levels=[0.05, 0.3, 1.0], cmap="Blues")
+    axis.plot(places[:, 1], places[:, 0], "*", color=ORANGE, markersize=11)
+    axis.set_aspect("equal")
+    axis.set_xlabel("east, m")
+    axis.set_ylabel("north, m")
+    return figure
+
+
+FIGURES = {"outlier": outlier, "landmarks": landmarks}
