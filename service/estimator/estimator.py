@@ -28,6 +28,7 @@ from service.estimator.deputy import Deputy
 from service.estimator.fusion import KALMAN, Fusion
 from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
+from service.estimator.jumps import Jumps
 from service.estimator.latecomers import latecomers_of
 from service.estimator.mode import mode_of
 from service.estimator.output import Output
@@ -73,7 +74,7 @@ class Estimator:
         self.configuration = configuration
         self.seed = seed
         self.health = HealthMonitor()
-        self.reset_counter = 0
+        self._jumps = Jumps()
         self._stopwatch: Stopwatch = stopwatch or Silent()
         self._vehicle = vehicle_of(configuration)
         self._filter = ParticleFilter(
@@ -133,7 +134,7 @@ class Estimator:
 
     def kept(self) -> Kept | None:
         """Return what a later process may go on from; ``None`` while the belief has no place."""
-        if self._fusion.time is None or self._search.blind:
+        if self._fusion.time is None or self._search.blind or self._deputy.speaking:
             return None
         return kept_of(self._filter, self._fusion.time, self._vehicle, self._intake, self._spoken)
 
@@ -148,7 +149,7 @@ class Estimator:
         begin_again(kept, self._filter, self._vehicle, self._intake)
         self._search.placed()
         self._fusion.begin(kept.time)
-        self.reset_counter = kept.reset_counter
+        self._jumps.steps = kept.reset_counter
 
     def reinitialize(self, start: Start) -> None:
         """Begin anew at the next tick as ``start`` says; ``reset_counter`` steps."""
@@ -156,13 +157,13 @@ class Estimator:
         self._starter = Starter(self.configuration, self._intake, self._vehicle.controls)
         self._told = start
 
-    def _obey(self, horizon: int, afforded: int) -> None:
+    def _obey(self, now: int, horizon: int, afforded: int) -> None:
         """Begin anew as was told since the last tick."""
         start, self._told = self._told, None
         if start is None:
             return
         self._search.told(self.configuration)
-        self.reset_counter += 1
+        self._jumps.done(now)
         if start.mode == "first_fix":
             self._fusion.time = None
             self.health.restart()
@@ -194,7 +195,7 @@ class Estimator:
         passed = self._intake.release(horizon)
         self._stopwatch.lap("ingest")
         afforded = min(afforded, self._filter.capacity)
-        self._obey(horizon, afforded)
+        self._obey(now, horizon, afforded)
         if self._fusion.time is None:
             passed = self._begin(horizon, passed, afforded)
         if self._fusion.time is not None:
@@ -228,8 +229,9 @@ class Estimator:
         self._fusion.fuse(passed, afforded, course)
         self._fusion.keep_up(horizon)
         self._fusion.catch_up(afforded, course)
-        self.reset_counter += self._fusion.taken_back - taken_back
-        self._find(afforded)
+        if self._fusion.taken_back > taken_back:
+            self._jumps.done(now)
+        self._find(now, afforded)
         if self._deputy.speaking:
             return
         if self._tracker is not None and course.level < Level.NO_CLOUD and not self._search.blind:
@@ -249,7 +251,7 @@ class Estimator:
                 self._tracker.started(self._fusion.time)
             self._stopwatch.lap("resampling")
 
-    def _find(self, afforded: int) -> None:
+    def _find(self, now: int, afforded: int) -> None:
         """Let the search for the place go on, and begin anew where it has found one."""
         assert self._fusion.time is not None
         blind = self._search.blind
@@ -259,7 +261,8 @@ class Estimator:
             self._filter.initialize(found)
             self._fusion.begin(self._fusion.time)
             self.health.heard(self._fusion.time)
-            self.reset_counter += not blind
+            if not blind:
+                self._jumps.done(now)
         self._stopwatch.lap("search")
 
     # --- estimates out ------------------------------------------------------------------------------------------
@@ -282,7 +285,9 @@ class Estimator:
         if pose is not None:
             self._search.published(pose.moments)
         state = self.health.judge(facts)
-        return self._output.estimate(
+        if self._tracker is not None:
+            self._jumps.led(now, self._tracker.jumps)
+        estimate = self._output.estimate(
             pose,
             self._intake.frame,
             sequence=self._sequence,
@@ -294,9 +299,16 @@ class Estimator:
             level_reason=course.reason(self.demand, afforded) if pose else "",
             demanded=self.demand,
             afforded=afforded,
-            reset_counter=self.reset_counter + (0 if self._tracker is None else self._tracker.jumps),
+            reset_counter=self._jumps.steps,
             mode=None if self._mode is None or pose is None else self._mode.mode,
         )
+        self._jumps.spoken(estimate)
+        return estimate
+
+    @property
+    def reset_counter(self) -> int:
+        """Jumps of the published position so far, for other reasons than motion."""
+        return self._jumps.steps
 
     @property
     def demand(self) -> int:

@@ -1,0 +1,81 @@
+"""The reset counter: steps once for each jump of the published position that is not motion.
+
+A jump is either done on purpose (the belief begins anew where a search, an order or a witness says; another hypothesis
+leads) or seen in what is published: within about a second the position has moved by more than :data:`FAR` beyond what
+its own velocity says, as when a receiver is back after minutes of dead reckoning. What moves in the wake of a jump
+belongs to it. A belief that had no place yet does not jump when it finds one.
+"""
+
+from __future__ import annotations
+
+import math
+
+from service.estimate import Estimate, HealthState
+from service.estimator.track import SECOND
+
+FAR = 5.0
+"""Metres."""
+
+WAKE = 2 * SECOND
+"""Nanoseconds."""
+
+FADING = 1.0
+"""Seconds in which an unexplained move is forgotten."""
+
+_NO_PLACE = (HealthState.WAITING, HealthState.CONVERGING)
+
+
+class Jumps:
+    """Counts jumps.
+
+    Attributes
+    ----------
+    steps : int
+        The reset counter.
+    """
+
+    def __init__(self) -> None:
+        self.steps = 0
+        self._switches = 0
+        self._last = -(2**62)
+        self._before: Estimate | None = None
+        self._north = self._east = 0.0
+
+    def done(self, now: int) -> None:
+        """Count a jump that was done on purpose at ``now`` (nanoseconds)."""
+        self._step(now)
+
+    def led(self, now: int, switches: int) -> None:
+        """Hear how often the leading hypothesis has changed so far."""
+        if switches > self._switches and now - self._last > WAKE:
+            self._step(now)
+        self._switches = switches
+
+    def spoken(self, estimate: Estimate) -> None:
+        """See what is published, and count a jump in it for the next estimate to tell."""
+        before, self._before = self._before, estimate
+        offset = None if before is None or before.health in _NO_PLACE else _offset(before, estimate)
+        if before is None or offset is None:
+            self._north = self._east = 0.0
+            return
+        kept = math.exp(-(estimate.monotonic_ns - before.monotonic_ns) / SECOND / FADING)
+        self._north = kept * self._north + offset[0]
+        self._east = kept * self._east + offset[1]
+        if math.hypot(self._north, self._east) > FAR:
+            if estimate.monotonic_ns - self._last > WAKE:
+                self._step(estimate.monotonic_ns)
+            self._north = self._east = 0.0
+
+    def _step(self, now: int) -> None:
+        self.steps += 1
+        self._last = now
+
+
+def _offset(before: Estimate, after: Estimate) -> tuple[float, float] | None:
+    """Return how far the position moved beyond what the velocity before says, north and east, metres."""
+    (n0, e0, _), (n1, e1, _) = before.position, after.position
+    if n0 is None or e0 is None or n1 is None or e1 is None:
+        return None
+    seconds = (after.monotonic_ns - before.monotonic_ns) / SECOND
+    vn, ve, _ = before.velocity
+    return n1 - n0 - seconds * (vn or 0.0), e1 - e0 - seconds * (ve or 0.0)
