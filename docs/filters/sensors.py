@@ -35,7 +35,7 @@ def outlier() -> Figure:
 def landmarks() -> Figure:
     """Likelihood of the place by one sight without a name, the heading being known."""
     places = np.array([(6.0, 6.0), (-6.0, 2.0), (2.0, -8.0)])
-    axis_values = np.linspace(-16.0, 16.0, 81)
+    axis_values = np.linspace(-16.0, 16.0, 61)
     east, north = np.meshgrid(axis_values, axis_values)
     particles = ParticleSet(("north", "east", "heading"), north.size)
     particles.count = north.size
@@ -44,9 +44,9 @@ def landmarks() -> Figure:
     sensor.weigh(particles, 0, particles.count, RangeBearingMeasurement(8.0, 0.4))
     figure, axis = plt.subplots(figsize=(4.6, 4.2), layout="constrained")
     shown = np.exp(particles.log_weights[: north.size].reshape(north.shape))
-    axis.contourf(east, north, shown / shown.max(), levels=[0.05, 0.3, 1.0], cmap="Blues")
+    axis.contourf(east, north, shown / shown.max(), levels=[0.1, 0.4, 1.0], cmap="Blues")
     axis.plot(places[:, 1], places[:, 0], "*", color=ORANGE, markersize=11)
-    axis.set_aspect("equal")
+    axis.set(aspect="equal", xticks=(-10, 0, 10), yticks=(-10, 0, 10))
     axis.set_xlabel("east, m")
     axis.set_ylabel("north, m")
     return figure
