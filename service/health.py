@@ -102,6 +102,7 @@ class HealthMonitor:
     def heard(self, now: int) -> None:
         """Note that an absolute measurement was used, though not by the belief: by the search that placed it."""
         self._last_reading = now
+        self._last_kind = self._last_kind or "heard by the search"
 
     def judge(self, facts: Facts) -> HealthState:
         """Return the state at this tick and keep it with its reason."""

@@ -161,3 +161,17 @@ def test_is_ambiguous_as_long_as_several_places_count() -> None:
     assert monitor.judge(facts(now)) is HealthState.TRACKING
     now = agreeing(monitor, now, 6, surprise=1.0)
     assert monitor.judge(replace(facts(now), ambiguity=several)) is HealthState.LOST
+
+
+def test_converges_while_the_place_is_searched_for_and_until_there_are_readings() -> None:
+    """With no place at all, whatever arrives; then by what the search heard, though the belief heard nothing yet."""
+    monitor = HealthMonitor()
+    searching = replace(facts(1, 120.0, missing=["odometry"]), searching="searching the area")
+    assert monitor.judge(searching) is HealthState.CONVERGING
+    assert monitor.reason == "searching the area; never heard: odometry"
+    monitor.restart()
+    monitor.heard(round(1.5 * SECOND))
+    assert monitor.judge(facts(2)) is HealthState.CONVERGING
+    assert monitor.judge(facts(2 + SILENCE / SECOND)) is HealthState.DEAD_RECKONING
+    now = agreeing(monitor, 6, 2)
+    assert monitor.judge(facts(now)) is HealthState.TRACKING
