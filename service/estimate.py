@@ -73,9 +73,9 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
         How many distinct places the belief holds; 0 while ``waiting``. Each has a weight of its own in the value of
         ``hypotheses``.
     particles, demanded, afforded : int
-        In use; needed by the belief's spread (KLD bound); affordable inside the budget.
+        In use (none at level 4); needed by the belief's spread (KLD bound); affordable inside the budget.
     effective_sample_size : float or None
-        Equation 4.36's inverse: 1 / sum of squared weights.
+        Equation 4.36's inverse: 1 / sum of squared weights; none at level 4.
     reset_counter : int
         Steps once when the position jumps for another reason than motion: the belief began anew elsewhere, or another
         hypothesis leads.
