@@ -1,8 +1,8 @@
 """The deputy: an extended Kalman filter that speaks while not even the fewest particles can be paid for.
 
-Level 4 of the declared order. The particles rest; the filter begins at their moments, takes the same controls and
-measurements, and its belief is what is published. When there is time again the particles, which fell behind, are drawn
-anew from it. What they were the only ones to hold, a second hypothesis, is lost on the way: one Gaussian is as wide as
+Level 4 of the declared order. The filter begins at the particles' moments, takes the same controls and measurements, and
+its belief is what is published. The particles are not weighed: they are drawn anew from it where it moves, for those who
+look at them, and when there is time again. What they were the only ones to hold, a second hypothesis, is lost on the way: one Gaussian is as wide as
 all of it was.
 """
 
@@ -72,8 +72,9 @@ class Deputy:
         return True
 
     def predict(self, control: Any, duration: float) -> None:
-        """Move as the particles would; see :meth:`filters.particle.ParticleFilter.predict`."""
+        """Move as the particles would, and have them follow: companions look at them for where the belief is."""
         self._filter.predict(control, duration)
+        self._draw(self._belief.count)
 
     def weigh(self, sensor: Sensor[Any], measurement: Any) -> Evidence:
         """Correct by a measurement; refuse what has no linear form, or would leave no Gaussian.
@@ -95,13 +96,16 @@ class Deputy:
         return self._carrier.at(belief_time, now)
 
     def hand_back(self, count: int) -> None:
-        """Draw ``count`` particles from its belief, if it speaks, and be silent.
+        """Draw ``count`` particles from its belief, if it speaks, and be silent."""
+        if self.speaking:
+            self.speaking = False
+            self._draw(count)
+
+    def _draw(self, count: int) -> None:
+        """Draw the particles anew.
 
         A marginalised state's variance given the path is the particles' own and stays: it is taken off here.
         """
-        if not self.speaking:
-            return
-        self.speaking = False
         self._drawn += 1
         names, covariance = self._belief.names, self._filter.covariance.copy()
         given_path = {**self._vehicle.motion.conditional_variances, **self._belief.particles.variances}
