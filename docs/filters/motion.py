@@ -61,7 +61,8 @@ def velocity() -> Figure:
     motion = ConstantVelocity(0.7, velocity_sigma=1.0)
     belief = ParticleFilter(motion, capacity=count, seed=5)
     belief.initialize({name: np.zeros(count) for name in motion.names})
-    sensor, rows, north = Position(sigma), [], 0.0
+    sensor, north = Position(sigma), 0.0
+    rows: list[tuple[float, float, float]] = []
     speeds = np.repeat([0.0, 1.2, -0.8], 10 * rate)
     for speed in speeds:
         north += speed / rate
