@@ -10,6 +10,7 @@ and ``afforded`` come from differs.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from typing import TypeVar
 
 import numpy as np
@@ -255,11 +256,14 @@ class Estimator:
         """Let the search for the place go on, and begin anew where it has found one."""
         assert self._fusion.time is not None
         blind = self._search.blind
+        if not blind and self._trust is not None and self._trust.decides:
+            return
         self._search.work(self._fusion.time)
         found = self._search.found(self._fusion.time, self._population.clamp(START_COUNT, afforded))
         if found is not None:
             self._filter.initialize(found)
-            self._fusion.begin(self._fusion.time)
+            with self._trust.unmoved() if self._trust is not None else nullcontext():
+                self._fusion.begin(self._fusion.time)
             self.health.heard(self._fusion.time)
             if not blind:
                 self._jumps.done(now)

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -67,11 +68,17 @@ HINDSIGHT = 45 * SECOND
 MARGIN = 4.0
 """Nats by which a witness may be contradicted more than another group's and still accuse."""
 
+RECENT = 10 * SECOND
+"""Who was not heard for so long has no say, nanoseconds."""
+
+WILD_SHARE = 0.4
+"""A witness that takes more of what the others measure for wild has lost its way, and accuses nobody."""
+
 POISONED = 9.2
 """Squared distance of the belief from the witness, in the witness's own measure, above which it was led away (99 %)."""
 
-NARROW = 0.35
-"""Radians: a heading known better than this makes a witness."""
+NARROW, PLACED = 0.35, 5.0
+"""Radians and metres: a belief with less spread than this is one place, and makes a witness."""
 
 USUAL: dict[type, float] = {Position: 5.0, Velocity: 0.5, Range: 1.5, Heading: 0.15}
 """Slow errors that an honest sensor may have whatever it claims: multipath of 5 m, a beacon's bias; m, m/s, rad."""
@@ -138,6 +145,11 @@ class Group:
         return any(leading) if leading else all(sensor.flagged for sensor in self.sensors.values())
 
     @property
+    def absolute(self) -> bool:
+        """Whether one of it says where the vehicle is."""
+        return any(sensor.absolute for sensor in self.sensors.values())
+
+    @property
     def agreed(self) -> bool:
         """Whether one of it has ever earned trust."""
         return any(sensor.agreed for sensor in self.sensors.values())
@@ -202,6 +214,31 @@ class Trust:
         """Dismiss the witnesses: they are of another belief."""
         self._time = time
         self._witnesses.clear()
+
+    @property
+    def decides(self) -> bool:
+        """Whether the only one who says where the vehicle is once agreed, and has a witness.
+
+        Should it disagree with the belief now, no search is to follow it: it may be a lie, and that is decided here.
+        """
+        placed = [group for group in self._groups.values() if group.absolute and self._recent(group)]
+        return len(placed) == 1 and placed[0].agreed and self._witnesses.judging(placed[0].place) is not None
+
+    def _recent(self, group: Group) -> bool:
+        return any(self._time - (sensor.heard or 0) < RECENT for sensor in group.sensors.values())
+
+    @contextmanager
+    def unmoved(self) -> Generator[None]:
+        """Keep the witnesses of those who once agreed with the belief, while a search replaces it.
+
+        What the search went by may be a lie; should it be, the witnesses still know.
+        """
+        live = self._witnesses.bank.live.copy()
+        yield
+        for group in self._groups.values():
+            if not group.agreed:
+                self._witnesses.dismiss(live, group.place)
+        self._witnesses.bank.live[:] = live
 
     def moved(self, start: int, end: int) -> None:
         """Move the witnesses, and have new ones begin when it is time."""
@@ -303,6 +340,8 @@ class Trust:
             for other in self._groups.values()
             if other is not group and other.agreed and not other.flagged
         ]
+        if self._witnesses.wildness(group.place) > WILD_SHARE:
+            return False
         return self._witnesses.contradiction(group.place) <= min(others, default=math.inf) + MARGIN
 
     def _look_back(self, group: Group, caution: float) -> None:
@@ -318,7 +357,7 @@ class Trust:
 
     def _begin(self, groups: list[Group]) -> None:
         moments = self._belief.moments()
-        if float(moments.variance[2]) > NARROW**2:
+        if float(moments.variance[2]) > NARROW**2 or float(moments.variance[:2].sum()) > 2.0 * PLACED**2:
             return
         gaussian = gaussian_of(self._belief, self._motion.conditional_variances)
         for group in groups:
