@@ -106,20 +106,21 @@ def jam() -> Figure:
         if belief.effective_sample_size < 200:
             belief.resample()
         error = math.dist(belief.moments().mean[:2], place[:2])
-        rows.append((time, off, error, trust.log_odds("position/bus") or 0.0))
+        odds = trust.log_odds("position/bus")
+        rows.append((time, off, error, math.nan if odds is None else odds))
     time, off, error, odds = np.array(rows).T
     figure, (above, below) = plt.subplots(2, figsize=(6.8, 4.6), sharex=True, layout="constrained")
     above.plot(time, odds, color=BLUE)
     for level, words in ((-5.0, "distrusted below"), (2.0, "trusted again above")):
         above.axhline(level, color=GREY, linewidth=0.8, linestyle="--")
-        above.text(seconds, level, words, ha="right", va="bottom", color=GREY, fontsize=8)
+        above.text(140.0, level, words, ha="center", va="bottom", color=GREY, fontsize=8)
     above.set_ylabel("log odds of honesty")
     below.plot(time, off, color=RED, label="the receiver's")
     below.plot(time, error, color=BLUE, linestyle="--", label="the belief's")
     below.set_ylabel("error, m")
     below.set_xlabel("time, s")
     below.set_xlim(0, seconds)
-    below.legend(loc="upper left")
+    below.legend(loc="upper right")
     return figure
 
 
