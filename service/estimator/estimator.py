@@ -235,9 +235,8 @@ class Estimator:
         self._find(now, afforded)
         if self._deputy.speaking:
             return
-        if self._tracker is not None and course.level < Level.NO_CLOUD and not self._search.blind:
-            self._tracker.look(now)
-            self._stopwatch.lap("extraction")
+        if course.level < Level.NO_CLOUD and not self._search.blind:
+            self._look(now)
         self._population.fit(afforded)
         if not course.only_predicts:
             self._population.reckon(now)
@@ -268,6 +267,15 @@ class Estimator:
             if not blind:
                 self._jumps.done(now)
         self._stopwatch.lap("search")
+
+    def _look(self, now: int) -> None:
+        """Ask for the hypotheses; while there are several nobody is a witness, for he would be of one of them."""
+        if self._tracker is None:
+            return
+        self._tracker.look(now)
+        if self._tracker.count > 1 and self._trust is not None and self._fusion.time is not None:
+            self._trust.started(self._fusion.time)
+        self._stopwatch.lap("extraction")
 
     # --- estimates out ------------------------------------------------------------------------------------------
 
