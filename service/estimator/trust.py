@@ -71,6 +71,9 @@ MARGIN = 4.0
 RECENT = 10 * SECOND
 """Who was not heard for so long has no say, nanoseconds."""
 
+ENOUGH = 3
+"""Ranges, or one position, that must be there beside a range to judge it: with fewer there are mirror images."""
+
 WILD_SHARE = 0.4
 """A witness that takes more of what the others measure for wild has lost its way, and accuses nobody."""
 
@@ -96,6 +99,8 @@ class Judged:
         What errors are normal for it.
     absolute : bool
         Whether it says where the vehicle is.
+    ranging : bool
+        Whether it is a range.
     worst : float
         Log odds that a second of readings takes from it at most.
     heard : int or None
@@ -109,6 +114,7 @@ class Judged:
     place: int
     level: ErrorLevel
     absolute: bool
+    ranging: bool
     worst: float
     heard: int | None = None
     agreed: bool = False
@@ -148,6 +154,11 @@ class Group:
     def absolute(self) -> bool:
         """Whether one of it says where the vehicle is."""
         return any(sensor.absolute for sensor in self.sensors.values())
+
+    @property
+    def ranging(self) -> bool:
+        """Whether it is a beacon: its ranges alone place nobody."""
+        return any(sensor.ranging for sensor in self.sensors.values())
 
     @property
     def agreed(self) -> bool:
@@ -309,7 +320,7 @@ class Trust:
                 return None
             kind = type(measured.model)
             group.sensors[measured.name] = Judged(
-                self._sensors, ErrorLevel(USUAL[kind]), measured.absolute, WORST[kind]
+                self._sensors, ErrorLevel(USUAL[kind]), measured.absolute, kind is Range, WORST[kind]
             )
             self._sensors += 1
             self._by_name[measured.name] = group
@@ -340,9 +351,19 @@ class Trust:
             for other in self._groups.values()
             if other is not group and other.agreed and not other.flagged
         ]
-        if self._witnesses.wildness(group.place) > WILD_SHARE:
+        if self._witnesses.wildness(group.place) > WILD_SHARE or (
+            group.ranging and self._others(group) < ENOUGH
+        ):
             return False
         return self._witnesses.contradiction(group.place) <= min(others, default=math.inf) + MARGIN
+
+    def _others(self, group: Group) -> int:
+        """Count the ranges that the others are worth: who stands on one is judged by where they say the vehicle is."""
+        return sum(
+            1 if other.ranging else ENOUGH
+            for other in self._groups.values()
+            if other is not group and other.absolute and not other.flagged and self._recent(other)
+        )
 
     def _look_back(self, group: Group, caution: float) -> None:
         """Have the belief begin anew as the witness has it, if it was led away from there."""
