@@ -69,6 +69,13 @@ def prepare_car() -> None:
     car.gnss(folder, recording, (20.0, 50.0))
 
 
+def prepare_robot() -> None:
+    """Make recordings of the robot among landmarks, with its bar codes' names and without."""
+    script = ROOT / "examples" / "mrclam.py"
+    run = ROOT / DATA / "mrclam_D7_R1.npz"
+    subprocess.run([sys.executable, str(script), str(run), str(ROOT / OUT)], check=True, capture_output=True)
+
+
 def replayed(stem: str, ending: str = ".tlog") -> Row:
     """Return the row of a recording with its facts beside it."""
     log = DATA / (stem + ending)
@@ -77,12 +84,15 @@ def replayed(stem: str, ending: str = ".tlog") -> Row:
 
 CAR = DATA / "comma2k19_seg40.candump.gz"
 CAR_FILES = (str(CAR), f"{OUT}/gnss.tlog", "--config", f"{OUT}/car.toml", "--truth", f"{OUT}/truth.csv")
+ROBOT = DATA / "mrclam_D7_R1.npz"
 SITL = Path("tests/sitl/data")
 ROWS = (
     Row("scenario `beacons`", (), ("scenario", "beacons")),
     replayed("plaza2"),
     *(replayed(f"uwb_{way}") for way in ("los_a1", "los_b3", "nlos_a1", "nlos_b3")),
     Row("`comma2k19_seg40`, GNSS blanked from 20 to 50 s", (CAR,), ("replay", *CAR_FILES), prepare_car),
+    Row("mrclam_D7_R1, landmarks known", (ROBOT,), ("replay", f"{OUT}/mrclam_D7_R1.mcap"), prepare_robot),
+    Row("mrclam_D7_R1, unknown", (ROBOT,), ("replay", f"{OUT}/mrclam_D7_R1_unknown.mcap"), prepare_robot),
     replayed("bcn_katwijk1", ".bin"),
     replayed("ubc_mission1"),
     replayed("sitl_rover"),

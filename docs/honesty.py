@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -121,7 +123,7 @@ def panel(axis: Axes, of: dict[str, np.ndarray], title: str) -> None:
     axis.set_xticks([0, 25, 50, 75, 95])
     axis.set_yticks([0, 25, 50, 75, 95])
     if of:
-        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2, fontsize=8, frameon=False)
+        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2, fontsize=7.5, frameon=False)
 
 
 def draw(kept: dict[str, Any]) -> None:
@@ -130,15 +132,25 @@ def draw(kept: dict[str, Any]) -> None:
     everything = [observed for of in parts.values() for observed in of.values()]
     if not everything:
         return
-    look = {"svg.hashsalt": "beliefd", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
+    look = {
+        "svg.hashsalt": "beliefd",
+        "svg.fonttype": "none",
+        "font.size": 9,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+    }
     with mpl.rc_context({**look, "axes.grid": True, "grid.color": "#e6e6e6", "axes.axisbelow": True}):
-        figure = Figure(figsize=(9.6, 5.0), layout="constrained")
+        figure = Figure(figsize=(9.6, 5.2), layout="constrained")
         axes = figure.subplots(1, 3)
         for axis, (title, of) in zip(axes, parts.items(), strict=False):
             panel(axis, of, title)
         panel(axes[2], {f"mean of these {len(everything)}": np.mean(everything, axis=0)}, "all together")
         axes[0].set_ylabel("observed to hold it, %")
-        figure.savefig(PICTURE, metadata={"Date": None})
+        # The legends lie below the axes, where the layout does not look: leave them room.
+        figure.get_layout_engine().set(rect=(0.0, 0.12, 1.0, 0.88))
+        text = StringIO()
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    PICTURE.write_text(re.sub(r"(\d\.\d\d)\d+", r"\1", text.getvalue()), encoding="utf-8")
 
 
 def percent(share: dict[str, float] | None) -> str:

@@ -3,11 +3,11 @@
     python examples/mrclam.py mrclam_D7_R1.npz out/
     beliefd replay out/mrclam_D7_R1.mcap
 
-A robot drives among 15 landmarks and four other robots, with wheel odometry and a camera that sees bar codes. The input
-has its rows as arrays: ``odom[t, v, w]``, ``meas[t, subject, range, bearing]``, ``landmarks[id, x, y]`` and
-``gt[t, x, y, th]`` (seconds, metres, radians, counter-clockwise from x). Out come the samples, the landmarks, the truth,
-and the facts of the place, once with the names on the bar codes (STEM) and once without (STEM_unknown). East is x, north
-is y. Robots are recorded as what was seen, and are not in the map.
+A robot drives among 15 landmarks and four other robots, with wheel odometry and a camera that sees bar codes. The
+input has its rows as arrays: ``odom[t, v, w]``, ``meas[t, subject, range, bearing]``, ``landmarks[id, x, y]`` and
+``gt[t, x, y, th]`` (seconds, metres, radians, counter-clockwise from x). Out come the samples, the landmarks, the
+truth, and the facts of the place, once with the names on the bar codes (STEM) and once without (STEM_unknown). East is
+x, north is y. Robots are recorded as what was seen, and are not in the map.
 """
 
 from __future__ import annotations

@@ -34,9 +34,9 @@ Array = NDArray[np.float64]
 
 FOUND = 0.02
 """Least share of the belief's weight that a new hypothesis has."""
-DROPPED = 1e-3
+DROPPED = 1e-4
 """Share below which a hypothesis is dropped, if it stays there."""
-GONE = 1e-5
+GONE = 1e-6
 """Share below which strays are no more than the tail of the only hypothesis there is."""
 
 DIVIDES = 2

@@ -74,6 +74,7 @@ class LabelledMoments:
 
     def __init__(self, dimension: int, most: int) -> None:
         self._references = np.zeros((most, dimension))
+        self._masses = np.zeros(most)
         self._sums = np.zeros((most, kernels.POSE_SUMS + 2 * (dimension - POSE)))
 
     def inherit(self, old: int, new: int) -> None:
@@ -91,11 +92,11 @@ class LabelledMoments:
     ) -> dict[int, Hypothesis]:
         """Return the hypothesis of each label that has a name and weight.
 
-        A heading is wrapped about its label's mean as the last call found it; where that was far off, the sums are
-        taken once more.
+        The sums are taken about each label's mean as the last call found it; where that was far off, they are taken
+        once more.
         """
         found = self._taken(columns, weights, labels, count, displacement, names)
-        if any(abs(self._offset(label)) > FAR for label in found):
+        if any(self._far(label) for label in found):
             self._refer(found)
             found = self._taken(columns, weights, labels, count, displacement, names)
         self._refer(found)
@@ -110,13 +111,24 @@ class LabelledMoments:
         displacement: Displacement,
         names: Mapping[int, int],
     ) -> dict[int, Hypothesis]:
-        kernels.moments.direct(columns, weights, labels, count, *displacement, self._references, self._sums)
-        total = float(self._sums[:, 0].sum())
+        asked = np.array(sorted(names), np.int64)
+        kernels.moments.direct(
+            columns, weights, labels, count, asked, *displacement, self._references, self._sums
+        )
+        kernels.masses.direct(weights, labels, count, self._masses)
+        total = float(self._masses.sum())
         return {
             label: self._one(label, name, total)
             for label, name in names.items()
             if self._sums[label, 0] > 0.0
         }
+
+    def _far(self, label: int) -> bool:
+        """Whether the reference was too far from the mean: its heading, or its place in terms of the spread."""
+        sums = self._sums[label]
+        n, e = sums[1:3] / sums[0]
+        square = float((sums[6] + sums[8]) / sums[0])
+        return abs(self._offset(label)) > FAR or n * n + e * e > 0.99 * square
 
     def _offset(self, label: int) -> float:
         return math.atan2(self._sums[label, 4], self._sums[label, 5])

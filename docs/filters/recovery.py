@@ -9,6 +9,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
+from filters.annealed import AnnealedSampler
+from filters.grid import Axis, Grid
+from filters.histogram import HistogramFilter
 from filters.motion import RandomWalk, Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from filters.proposals import Ring, Rings
@@ -140,5 +143,73 @@ def kernels() -> Figure:
     return figure
 
 
-FIGURES = {"kidnapped": kidnapped, "rings": rings, "kernels": kernels}
+def search() -> Figure:
+    """A vehicle that drove an arc of 12 m between 24 ranges of sigma 0.5 m, anywhere in a field of 170 m square."""
+    rng = np.random.default_rng(4)
+    there = np.linspace(0.0, 12.0, 24)  # the way so far: forward and right of where it began
+    forward, right = 30.0 * np.sin(there / 30.0), 30.0 - 30.0 * np.cos(there / 30.0)
+    truth = np.array([[20.0, -15.0, 0.9]])
+
+    def distances(points: np.ndarray) -> np.ndarray:
+        sine, cosine = np.sin(points[:, 2:]), np.cos(points[:, 2:])
+        north = points[:, :1] + forward * cosine - right * sine
+        east = points[:, 1:2] + forward * sine + right * cosine
+        beacons = np.array([BEACONS[k % 3] for k in range(24)]).T
+        return np.hypot(north - beacons[0], east - beacons[1])
+
+    measured = distances(truth)[0] + 0.5 * rng.standard_normal(24)
+
+    def log_likelihood(points: np.ndarray) -> np.ndarray:
+        square = ((distances(points) - measured) / 0.5) ** 2
+        return 0.5 * np.logaddexp(math.log(0.95 / 1.25) - 0.5 * square, math.log(0.05 / 200.0)).sum(axis=1)
+
+    grid = HistogramFilter(Grid((Axis(-85.0, 85.0, 64), Axis(-85.0, 85.0, 64))))
+    for k, (north, east) in enumerate(
+        BEACONS
+    ):  # the first range to each, widened by the way since and by a cell
+        wide = 3.0
+        grid.update(
+            lambda at, n=north, e=east, z=measured[k], w=wide: (
+                -0.25 * ((np.hypot(at[0] - n, at[1] - e) - z) / w) ** 2
+            )
+        )
+    points = np.column_stack([grid.draw(2048, rng), rng.uniform(-math.pi, math.pi, 2048)])
+
+    def log_start(at: np.ndarray) -> np.ndarray:
+        with np.errstate(divide="ignore"):
+            return np.log(grid.evaluate(at[:, :2]) / (2.0 * math.pi))
+
+    sampler = AnnealedSampler(points, log_start, log_likelihood, rng, wraps=(2,))
+    figure, (axes, below) = plt.subplots(2, 4, figsize=(8.2, 4.4), layout="constrained", height_ratios=(2, 1))
+    axes[0].imshow(
+        np.sqrt(grid.belief), origin="lower", extent=(-85, 85, -85, 85), cmap="Blues", interpolation="nearest"
+    )
+    axes[0].set_title("grid: where the mass is", fontsize=9)
+    for axis, least in zip(axes[1:], (0.0, 0.02, 1.0), strict=True):
+        while sampler.share < least or not least:
+            if sampler.advance() or not least:
+                break
+        sampler.finish() if least == 1.0 else None
+        at = sampler.points
+        axis.scatter(at[:, 1], at[:, 0], s=3, color=BLUE, alpha=0.4, linewidths=0, rasterized=True)
+        axis.set_title(f"points, b = {sampler.share:.3g}", fontsize=9)
+        under = below[list(axes).index(axis)]
+        under.hist(at[:, 2], bins=60, range=(-math.pi, math.pi), color=BLUE)
+        under.axvline(truth[0, 2], color=RED, linewidth=1)
+        under.set_xlabel("heading, rad")
+        under.set_yticks([])
+    below[0].axis("off")
+    for axis in axes:
+        axis.plot([e for _, e in BEACONS], [n for n, _ in BEACONS], "^", color="black", markersize=4)
+        axis.plot(truth[:, 1], truth[:, 0], "o", markerfacecolor="none", color=RED, markersize=8)
+        axis.set_aspect("equal")
+        axis.set_xlim(-85, 85)
+        axis.set_ylim(-85, 85)
+        axis.grid(visible=False)
+        axis.set_xlabel("east, m")
+    axes[0].set_ylabel("north, m")
+    return figure
+
+
+FIGURES = {"kidnapped": kidnapped, "rings": rings, "kernels": kernels, "search": search}
 STYLE = {"savefig.dpi": 130}

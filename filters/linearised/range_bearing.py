@@ -1,8 +1,8 @@
 """Range and bearing linearised: the measurement update of Tables 7.2 and 7.3 of *Probabilistic Robotics*.
 
 With (n, e) the way to the landmark and r its length, the derivatives by the position are -(n, e)/r of the distance and
-(e, -n)/r² of the bearing, whose derivative by the heading is -1. A landmark without a name is taken for the likeliest, by
-the sensor's own noise.
+(e, -n)/r² of the bearing, whose derivative by the heading is -1. A landmark without a name is taken for the likeliest,
+by the sensor's own noise.
 """
 
 from __future__ import annotations

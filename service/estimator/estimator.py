@@ -10,6 +10,7 @@ and ``afforded`` come from differs.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from typing import TypeVar
 
 import numpy as np
@@ -234,9 +235,8 @@ class Estimator:
         self._find(now, afforded)
         if self._deputy.speaking:
             return
-        if self._tracker is not None and course.level < Level.NO_CLOUD and not self._search.blind:
-            self._tracker.look(now)
-            self._stopwatch.lap("extraction")
+        if course.level < Level.NO_CLOUD and not self._search.blind:
+            self._look(now)
         self._population.fit(afforded)
         if not course.only_predicts:
             self._population.reckon(now)
@@ -255,15 +255,27 @@ class Estimator:
         """Let the search for the place go on, and begin anew where it has found one."""
         assert self._fusion.time is not None
         blind = self._search.blind
+        if not blind and self._trust is not None and self._trust.decides:
+            return
         self._search.work(self._fusion.time)
         found = self._search.found(self._fusion.time, self._population.clamp(START_COUNT, afforded))
         if found is not None:
             self._filter.initialize(found)
-            self._fusion.begin(self._fusion.time)
+            with self._trust.unmoved() if self._trust is not None else nullcontext():
+                self._fusion.begin(self._fusion.time)
             self.health.heard(self._fusion.time)
             if not blind:
                 self._jumps.done(now)
         self._stopwatch.lap("search")
+
+    def _look(self, now: int) -> None:
+        """Ask for the hypotheses; while there are several nobody is a witness, for he would be of one of them."""
+        if self._tracker is None:
+            return
+        self._tracker.look(now)
+        if self._tracker.count > 1 and self._trust is not None and self._fusion.time is not None:
+            self._trust.started(self._fusion.time)
+        self._stopwatch.lap("extraction")
 
     # --- estimates out ------------------------------------------------------------------------------------------
 

@@ -42,10 +42,8 @@ _HEADING = 2
 class Gait(Protocol):
     """What a ground vehicle wants to know of its motion mode."""
 
-    @property
-    def stands(self) -> bool:
-        """Whether it is certain to stand still."""
-        ...
+    stands: bool
+    """Whether it is certain to stand still over the stretch of the last :meth:`approach`."""
 
     def approach(self, start: int, end: int) -> None:
         """Take the controls of the stretch that the belief is about to be moved over."""

@@ -21,6 +21,8 @@ from filters.sensing import (
     Position,
     PositionMeasurement,
     Range,
+    RangeBearing,
+    RangeBearingMeasurement,
     RangeMeasurement,
 )
 from filters.sensing.biased_range import BiasedRange, BiasedRangeMeasurement
@@ -109,6 +111,17 @@ def _position(measured: Measurement, variance: float, _turn: float) -> PositionM
     )
 
 
+def _landmark(measured: Measurement, variance: float, turn: float) -> RangeBearingMeasurement:
+    model, value = cast(RangeBearing, measured.model), cast(RangeBearingMeasurement, measured.value)
+    distance = model.sigma_distance if value.sigma_distance is None else value.sigma_distance
+    bearing = model.sigma_bearing if value.sigma_bearing is None else value.sigma_bearing
+    across = variance / max(value.distance, distance) ** 2
+    return value._replace(
+        sigma_distance=math.sqrt(distance * distance + variance),
+        sigma_bearing=math.sqrt(bearing * bearing + turn + across),
+    )
+
+
 def _heading(measured: Measurement, _variance: float, turn: float) -> HeadingMeasurement:
     model, value = cast(Heading, measured.model), cast(HeadingMeasurement, measured.value)
     sigma = model.sigma if value.sigma is None else value.sigma
@@ -118,6 +131,7 @@ def _heading(measured: Measurement, _variance: float, turn: float) -> HeadingMea
 _WIDEN: dict[type, Callable[[Measurement, float, float], Any]] = {
     RangeMeasurement: _range,
     BiasedRangeMeasurement: _range,
+    RangeBearingMeasurement: _landmark,
     PositionMeasurement: _position,
     HeadingMeasurement: _heading,
 }

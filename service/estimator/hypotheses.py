@@ -28,7 +28,7 @@ INTERVAL = SECOND // 10
 RESOLUTION = 1.0
 """Metres; places nearer to each other than about twice this are one."""
 
-EACH = 1500
+EACH = 2500
 """Particles that each hypothesis demands: by fewer its evidence is known too badly to weigh it against another's."""
 
 AMBIGUOUS = 0.05

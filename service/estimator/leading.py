@@ -20,7 +20,7 @@ from filters.particle import ParticleFilter
 from service.estimator.carrier import Pose
 from service.estimator.hypotheses import Tracker
 
-CLOUD = 2048
+CLOUD = 1024
 """Particles that the radius is taken from, evenly spaced among all."""
 
 WITHIN = 0.95

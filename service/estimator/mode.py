@@ -36,6 +36,9 @@ from service.estimator.witnesses import gaussian_of
 GENERATOR = np.array(((-0.2, 0.2, 0.0), (0.05, -0.06, 0.01), (0.05, 0.2, -0.25)))
 """Per second: how often still, moving, slipping (rows) turn into each other; a slip lasts some 5 s, each 100 s."""
 
+BEGINNING = (0.5, 0.45, 0.05)
+"""Probabilities of still, moving and slipping while nothing was heard."""
+
 SLIP = 0.2
 """How far wheels that slip are off, as a share of the speed (one standard deviation)."""
 
@@ -54,6 +57,9 @@ GYRO_STANDS = np.log((0.99, 0.4, 0.4))
 GYRO_TURNS = np.log((0.01, 0.6, 0.6))
 """Log probability of what a :data:`STRETCH` of wheels and gyro looks like in each mode. The wheels of a vehicle that
 creeps may stand; the gyro of one that drives straight does."""
+
+TELLING = SECOND // 10
+"""Nanoseconds of wheels and gyro that are taken together."""
 
 STRETCH = 0.2
 """Seconds of odometry that count as one independent reading."""
@@ -89,6 +95,11 @@ class Mode:
         What the two Gaussians begin as.
     rolled : callable
         What odometer and gyro said between two times, undoubted.
+
+    Attributes
+    ----------
+    stands : bool
+        Whether the vehicle is certain to stand still over the stretch of the last :meth:`approach`.
     """
 
     def __init__(
@@ -102,8 +113,10 @@ class Mode:
         self._belief = belief
         self._rolled = rolled
         self._bank = GaussianBank(motion, slow, 2)
-        self._modes = DiscreteBayesFilter[MotionMode](_MODES, np.eye(3), (0.5, 0.45, 0.05))
+        self._modes = DiscreteBayesFilter[MotionMode](_MODES, np.eye(3), BEGINNING)
+        self.stands = False
         self._slips = False
+        self._told: int | None = None
         self._bias = 0.0
         self._checked = 0
 
@@ -117,11 +130,6 @@ class Mode:
         """Probability of standing still."""
         return self._modes.probability(MotionMode.STILL)
 
-    @property
-    def stands(self) -> bool:
-        """Whether the vehicle is certain to stand still."""
-        return self.still >= CERTAIN
-
     def doubt(self, distance: float, duration: float) -> float:
         """Return the variance (m²) by which a distance is to be doubted, over so many seconds."""
         return _slip_variance(distance, duration) if self._slips and duration > 0.0 else 0.0
@@ -129,31 +137,52 @@ class Mode:
     # --- before a move --------------------------------------------------------------------------------------------
 
     def approach(self, start: int, end: int) -> None:
-        """Take what odometer and gyro say of the stretch that the belief is about to be moved over."""
-        duration = (end - start) / SECOND
-        if duration <= 0.0:
+        """Take what odometer and gyro say of the stretch that the belief is about to be moved over.
+
+        A stretch in which anything turns is moved over, whatever the mode: not even the beginning of a drive is lost.
+        """
+        if end <= start:
             return
-        slipping = self._modes.probability(MotionMode.SLIPPING)
-        self._slips = slipping >= (GRIPPING if self._slips else SLIPPERY)
-        control = self._rolled(start, end)
+        if self._told is None:
+            self._told = start
+        if end - self._told >= TELLING:
+            self._tell((end - self._told) / SECOND, self._rolled(self._told, end))
+            self._told = end
+        rolls, turns = self._looks((end - start) / SECOND, self._rolled(start, end))
+        self.stands = not rolls and not turns and self.still >= CERTAIN
+
+    def _looks(self, duration: float, control: UnicycleControl) -> tuple[bool, bool]:
+        """Say whether the wheels roll, and whether the gyro turns."""
+        return (
+            abs(control.distance) > CREEP * duration,
+            abs(control.turn - self._bias * duration) > SPIN * duration,
+        )
+
+    def _tell(self, duration: float, control: UnicycleControl) -> None:
+        """Let the modes change, and weigh them by wheels and gyro."""
         matrix = np.eye(3) + min(duration, 1.0) * GENERATOR  # exp(Q t) to first order: strides are short
         if self._bank.live.all():
             mix(self._bank, _among_wheeled(matrix), self._modes.belief[1:] + 1e-12)
         self._modes.propagate(DenseTransition(matrix))
-        share = min(1.0, duration / STRETCH)
+        rolls, turns = self._looks(duration, control)
+        logs = np.zeros(3)
         if control.distance_sigma == 0.0:
-            turns = abs(control.distance) > CREEP * duration
-            self._modes.update_log(share * (WHEELS_TURN if turns else WHEELS_STAND))
+            logs += WHEELS_TURN if rolls else WHEELS_STAND
         if control.turn_sigma == 0.0:
-            turns = abs(control.turn - self._bias * duration) > SPIN * duration
-            self._modes.update_log(share * (GYRO_TURNS if turns else GYRO_STANDS))
+            logs += GYRO_TURNS if turns else GYRO_STANDS
+        self._modes.update_log(min(1.0, duration / STRETCH) * logs)
+        slipping = self._modes.probability(MotionMode.SLIPPING)
+        self._slips = slipping >= (GRIPPING if self._slips else SLIPPERY)
 
     # --- a companion of the belief --------------------------------------------------------------------------------
 
     def started(self, time: int) -> None:
-        """Let the Gaussians begin anew as the belief does."""
+        """Let the Gaussians begin anew as the belief does, and trust the wheels again."""
         self._bank.live[:] = False
+        self._modes.reset(BEGINNING)
+        self._slips = False
         self._checked = time - CHECKING
+        self._told = None
 
     def moved(self, start: int, end: int) -> None:
         """Move both Gaussians, one of them in doubt of the wheels."""

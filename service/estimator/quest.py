@@ -19,7 +19,15 @@ from numpy.typing import NDArray
 from filters.annealed import AnnealedSampler
 from filters.grid import Axis, Columns, Grid
 from filters.histogram import HistogramFilter
-from filters.sensing import Position, PositionMeasurement, Range, RangeMeasurement
+from filters.sensing import (
+    Position,
+    PositionMeasurement,
+    Range,
+    RangeBearing,
+    RangeBearingMeasurement,
+    RangeMeasurement,
+)
+from filters.sensing.biased_range import BiasedRange, BiasedRangeMeasurement
 from service.config import Configuration
 from service.estimator.hearing import Heard, Likelihood
 from service.estimator.start import Anchor, draw
@@ -172,10 +180,11 @@ class Quest:
         value, model = one.measured.value, one.measured.model
         cell = float(widths @ widths) / 12.0
         blur = cell + float(self._shape.variance[index]) + 0.5 * float(self._shape.reach[index]) ** 2
-        if isinstance(value, RangeMeasurement):
-            range_model = cast(Range, model)
+        if isinstance(value, RangeMeasurement | BiasedRangeMeasurement):
+            range_model = cast("Range | BiasedRange", model)
             scale, scale_sigma = self._known.get(range_model.scale or "", (1.0, 0.0))
-            bias, bias_sigma = self._known.get(range_model.bias or "", (0.0, 0.0))
+            name = range_model.bias if isinstance(range_model, Range) else None
+            bias, bias_sigma = self._known.get(name or "", (0.0, 0.0))
             sigma = range_model.sigma if value.sigma is None else value.sigma
             slow = (
                 bias_sigma**2
@@ -192,6 +201,11 @@ class Quest:
                 range_model.outliers,
                 range_model.span,
             )
+        if isinstance(value, RangeBearingMeasurement) and value.north is not None and value.east is not None:
+            landmark = cast(RangeBearing, model)
+            sigma = landmark.sigma_distance if value.sigma_distance is None else value.sigma_distance
+            where = value.north, value.east, 0.0, 1.0, value.distance
+            return Coarse(*where, math.sqrt(sigma * sigma + blur), landmark.outliers, landmark.span)
         if isinstance(value, PositionMeasurement):
             position = cast(Position, model)
             sigma = position.sigma if value.sigma_north is None else value.sigma_north

@@ -28,7 +28,8 @@ from filters.belief import Evidence, Moments
 from filters.linearised.shadow import LINEARISED
 from filters.recovery import AugmentedRecovery, expected_log_evidence
 from filters.resampling import systematic
-from filters.sensing import PositionMeasurement, RangeMeasurement
+from filters.sensing import PositionMeasurement, RangeBearingMeasurement, RangeMeasurement
+from filters.sensing.biased_range import BiasedRangeMeasurement
 from service.config import Configuration
 from service.estimator.hearing import Heard, Likelihood
 from service.estimator.measuring import Measurement
@@ -379,7 +380,9 @@ class Search:
 def _reach(measured: Measurement, far: float) -> tuple[float, float, float] | None:
     """Return a square (middle north, east, half a side) that the place of a measurement must lie in, or ``None``."""
     value = measured.value
-    if isinstance(value, RangeMeasurement):
+    if isinstance(value, RangeMeasurement | BiasedRangeMeasurement | RangeBearingMeasurement):
+        if value.north is None or value.east is None:
+            return None
         return value.north, value.east, 1.2 * value.distance + 5.0 + far
     if isinstance(value, PositionMeasurement):
         return value.north, value.east, 5.0 * (value.sigma_north or 3.0) + 5.0 + far

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -67,11 +68,20 @@ HINDSIGHT = 45 * SECOND
 MARGIN = 4.0
 """Nats by which a witness may be contradicted more than another group's and still accuse."""
 
+RECENT = 10 * SECOND
+"""Who was not heard for so long has no say, nanoseconds."""
+
+ENOUGH = 3
+"""Ranges, or one position, that must be there beside a range to judge it: with fewer there are mirror images."""
+
+WILD_SHARE = 0.4
+"""A witness that takes more of what the others measure for wild has lost its way, and accuses nobody."""
+
 POISONED = 9.2
 """Squared distance of the belief from the witness, in the witness's own measure, above which it was led away (99 %)."""
 
-NARROW = 0.35
-"""Radians: a heading known better than this makes a witness."""
+NARROW, PLACED = 0.35, 5.0
+"""Radians and metres: a belief with less spread than this is one place, and makes a witness."""
 
 USUAL: dict[type, float] = {Position: 5.0, Velocity: 0.5, Range: 1.5, Heading: 0.15}
 """Slow errors that an honest sensor may have whatever it claims: multipath of 5 m, a beacon's bias; m, m/s, rad."""
@@ -89,6 +99,8 @@ class Judged:
         What errors are normal for it.
     absolute : bool
         Whether it says where the vehicle is.
+    ranging : bool
+        Whether it is a range.
     worst : float
         Log odds that a second of readings takes from it at most.
     heard : int or None
@@ -102,6 +114,7 @@ class Judged:
     place: int
     level: ErrorLevel
     absolute: bool
+    ranging: bool
     worst: float
     heard: int | None = None
     agreed: bool = False
@@ -136,6 +149,16 @@ class Group:
         """Whether one of it that says where the vehicle is has been caught, or all of it."""
         leading = [sensor.flagged for sensor in self.sensors.values() if sensor.absolute]
         return any(leading) if leading else all(sensor.flagged for sensor in self.sensors.values())
+
+    @property
+    def absolute(self) -> bool:
+        """Whether one of it says where the vehicle is."""
+        return any(sensor.absolute for sensor in self.sensors.values())
+
+    @property
+    def ranging(self) -> bool:
+        """Whether it is a beacon: its ranges alone place nobody."""
+        return any(sensor.ranging for sensor in self.sensors.values())
 
     @property
     def agreed(self) -> bool:
@@ -202,6 +225,31 @@ class Trust:
         """Dismiss the witnesses: they are of another belief."""
         self._time = time
         self._witnesses.clear()
+
+    @property
+    def decides(self) -> bool:
+        """Whether the only one who says where the vehicle is once agreed, and has a witness.
+
+        Should it disagree with the belief now, no search is to follow it: it may be a lie, and that is decided here.
+        """
+        placed = [group for group in self._groups.values() if group.absolute and self._recent(group)]
+        return len(placed) == 1 and placed[0].agreed and self._witnesses.judging(placed[0].place) is not None
+
+    def _recent(self, group: Group) -> bool:
+        return any(self._time - (sensor.heard or 0) < RECENT for sensor in group.sensors.values())
+
+    @contextmanager
+    def unmoved(self) -> Generator[None]:
+        """Keep the witnesses of those who once agreed with the belief, while a search replaces it.
+
+        What the search went by may be a lie; should it be, the witnesses still know.
+        """
+        live = self._witnesses.bank.live.copy()
+        yield
+        for group in self._groups.values():
+            if not group.agreed:
+                self._witnesses.dismiss(live, group.place)
+        self._witnesses.bank.live[:] = live
 
     def moved(self, start: int, end: int) -> None:
         """Move the witnesses, and have new ones begin when it is time."""
@@ -272,7 +320,7 @@ class Trust:
                 return None
             kind = type(measured.model)
             group.sensors[measured.name] = Judged(
-                self._sensors, ErrorLevel(USUAL[kind]), measured.absolute, WORST[kind]
+                self._sensors, ErrorLevel(USUAL[kind]), measured.absolute, kind is Range, WORST[kind]
             )
             self._sensors += 1
             self._by_name[measured.name] = group
@@ -303,7 +351,19 @@ class Trust:
             for other in self._groups.values()
             if other is not group and other.agreed and not other.flagged
         ]
+        if self._witnesses.wildness(group.place) > WILD_SHARE or (
+            group.ranging and self._others(group) < ENOUGH
+        ):
+            return False
         return self._witnesses.contradiction(group.place) <= min(others, default=math.inf) + MARGIN
+
+    def _others(self, group: Group) -> int:
+        """Count the ranges that the others are worth: who stands on one is judged by where they say the vehicle is."""
+        return sum(
+            1 if other.ranging else ENOUGH
+            for other in self._groups.values()
+            if other is not group and other.absolute and not other.flagged and self._recent(other)
+        )
 
     def _look_back(self, group: Group, caution: float) -> None:
         """Have the belief begin anew as the witness has it, if it was led away from there."""
@@ -318,7 +378,7 @@ class Trust:
 
     def _begin(self, groups: list[Group]) -> None:
         moments = self._belief.moments()
-        if float(moments.variance[2]) > NARROW**2:
+        if float(moments.variance[2]) > NARROW**2 or float(moments.variance[:2].sum()) > 2.0 * PLACED**2:
             return
         gaussian = gaussian_of(self._belief, self._motion.conditional_variances)
         for group in groups:

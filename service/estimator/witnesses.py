@@ -33,6 +33,9 @@ GATE = 0.9999
 MOST_NIS = 25.0
 """One measurement contradicts a witness by this much at most."""
 
+WILD, WILD_MEMORY = 13.8, 0.05
+"""NIS of a wild reading, and the share of the newest in the running average of how many there are."""
+
 MEMORY = 20.0
 """Seconds over which contradictions are summed up."""
 
@@ -78,6 +81,12 @@ class Witnesses:
         self.bank = GaussianBank(motion, slow, SLOTS * groups)
         self._began = np.zeros(SLOTS * groups, np.int64)
         self._contradiction: Matrix = np.zeros(SLOTS * groups)
+        self._wildness: Matrix = np.zeros(SLOTS * groups)
+
+    @staticmethod
+    def dismiss(live: NDArray[np.bool_], group: int) -> None:
+        """Strike a group's witnesses from flags of who is live."""
+        live[SLOTS * group : SLOTS * (group + 1)] = False
 
     def clear(self) -> None:
         """Dismiss all of them."""
@@ -100,6 +109,7 @@ class Witnesses:
         nis = self.bank.correct(expectations, chosen, GATE).nis[chosen]
         excess = np.minimum(nis, MOST_NIS) - expectations.residual.shape[1]
         self._contradiction[chosen] += excess / measured.repeats
+        self._wildness[chosen] += WILD_MEMORY / measured.repeats * ((nis > WILD) - self._wildness[chosen])
 
     def judging(self, group: int) -> int | None:
         """Return the member that judges the group: the older one; ``None`` if there is none."""
@@ -118,6 +128,11 @@ class Witnesses:
         member = self.judging(group)
         return math.inf if member is None else 0.5 * float(self._contradiction[member])
 
+    def wildness(self, group: int) -> float:
+        """Return which share of what the others measure the group's witness takes for wild, 0 to 1."""
+        member = self.judging(group)
+        return 0.0 if member is None else float(self._wildness[member])
+
     def testify(self, group: int, measured: Measurement) -> Testimony | None:
         """Say what the group's witness makes of a measurement of it; ``None`` without a witness."""
         member = self.judging(group)
@@ -135,6 +150,7 @@ class Witnesses:
         self.bank.set(member, mean, covariance)
         self._began[member] = time
         self._contradiction[member] = 0.0
+        self._wildness[member] = 0.0
 
     def gaussian(self, group: int) -> tuple[Matrix, Matrix] | None:
         """Return mean and covariance of the judging witness."""

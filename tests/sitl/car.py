@@ -18,7 +18,7 @@ latitude = {latitude}
 longitude = {longitude}
 altitude = {altitude}
 [motion]
-yaw_rate_noise = 0.002            # a car on tyres does not skid; its sensor counts quarters of a degree per second
+yaw_rate_noise = 0.001            # a car on tyres does not skid; its sensor counts quarters of a degree per second
 slip_noise = 0.02
 gyro_bias_sigma = 0.01
 [[link]]

@@ -57,3 +57,24 @@ def test_one_seed_gives_the_same_bytes_every_time(recording: Path, tmp_path: Pat
     first = (tmp_path / "a" / "estimates_seed7.csv").read_bytes()
     assert len(first) > 1_000_000
     assert first == (tmp_path / "b" / "estimates_seed7.csv").read_bytes()
+
+
+# metres: least squares and error-state Kalman filter, as published with the recordings
+PUBLISHED = {"los_a1": (1.04, 1.12), "los_b3": (0.52, 0.60), "nlos_a1": (0.98, 0.94), "nlos_b3": (0.64, 0.84)}
+
+
+@pytest.mark.parametrize("recording", [f"uwb_{name}.tlog" for name in PUBLISHED], indirect=True)
+def test_a_tag_among_four_anchors(recording: Path) -> None:
+    """Ranges alone, nothing but the place beside the log: below both published figures, and an honest region."""
+    runs = runs_of(recording)
+    errors = [run.score.rmse_m for run in runs if run.score.rmse_m is not None]
+    assert len(errors) == len(SEEDS)
+    assert sum(errors) / len(errors) < min(PUBLISHED[recording.stem.removeprefix("uwb_")])
+    for run in runs:
+        assert run.score.coverage_95 is not None
+        assert 0.9 <= run.score.coverage_95 < 1.0
+        assert run.score.nees_mean is not None
+        assert 1.0 < run.score.nees_mean < 3.0
+        assert run.health.get("tracking", 0.0) > 0.95
+        assert run.shadow.score.rmse_m is not None
+        assert {f"range_bias/{beacon}" for beacon in (3, 5, 9, 12)} <= set(run.biases)

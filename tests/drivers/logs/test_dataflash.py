@@ -346,7 +346,15 @@ def test_a_real_flight_among_beacons() -> None:
     log: LogReader = DataflashReader(KATWIJK, "autopilot")
     samples = list(log)
     kinds = Counter(sample.source for sample in samples)
-    assert kinds == {"BCN": 10_132, "IMU": 6_818, "MAG": 2_728, "BARO": 2_727, "ATT": 2_727, "ORGN": 1}
+    assert kinds == {
+        "BCN": 10_132,
+        "IMU": 6_818,
+        "MAG": 2_728,
+        "BARO": 2_727,
+        "ATT": 2_727,
+        "ORGN": 1,
+        "XKF0": 4,
+    }
     assert log.report().malformed == {}
     parsed = np.load(KATWIJK.with_suffix(".npz"))
     imu = [s for s in samples if s.source == "IMU"]

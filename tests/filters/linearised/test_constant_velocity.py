@@ -81,7 +81,7 @@ def test_the_shadow_says_position_and_velocity_together() -> None:
     size = len(shadow.names)
     variance = np.array([1.0, 2.0, 0.0, 0.5, 0.25, 0.0, 0.1])
     pose = np.diag(variance[:3])
-    shadow.initialize(Moments(shadow.names, np.arange(size) * 1.0, pose, variance, np.inf))
+    shadow.initialize(Moments(shadow.names, np.arange(size, dtype=np.float64), pose, variance, np.inf))
     shadow.predict(FREE, 2.0)
     found = shadow.joint(("north", "velocity_north"))
     wanted = np.array(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -156,8 +157,9 @@ def test_a_new_start_forgets_the_velocity() -> None:
 @pytest.mark.parametrize("bad", [-0.1, math.inf, math.nan])
 @pytest.mark.parametrize("name", ["acceleration_noise", "velocity_sigma", "vertical_noise", "vertical_sigma"])
 def test_what_cannot_be_is_refused(name: str, bad: float) -> None:
+    make: Any = ConstantVelocity
     with pytest.raises(ValueError, match=name):
-        ConstantVelocity(**{"acceleration_noise": 0.5, name: bad})
+        make(**{"acceleration_noise": 0.5, name: bad})
 
 
 def test_other_than_two_or_three_dimensions_are_refused() -> None:

@@ -149,7 +149,7 @@ def test_a_long_range_is_taken_for_blocked_and_a_short_one_is_not() -> None:
         ({"sigma": 1.0, "longest": math.inf}, "longest"),
     ],
 )
-def test_what_cannot_be_is_refused(arguments: dict[str, float], word: str) -> None:
+def test_what_cannot_be_is_refused(arguments: dict[str, Any], word: str) -> None:
     with pytest.raises(ValueError, match=word):
         BiasedRange(**arguments)
 

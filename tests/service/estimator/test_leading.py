@@ -56,7 +56,7 @@ def test_the_radius_holds_95_percent_of_all(odds: float, least: float, most: flo
     assert least < radius < most
     distances = np.hypot(belief.column("north") - moments.mean[0], belief.column("east") - moments.mean[1])
     inside = float(belief.weights[distances <= radius].sum() / belief.weights.sum())
-    assert abs(inside - 0.95) < 0.02  # of 2,048 particles, one standard deviation is 0.005
+    assert abs(inside - 0.95) < 0.03  # of 1,024 particles, one standard deviation is 0.007
 
 
 def test_what_the_way_adds_is_turned_with_each_hypothesis_s_own_heading() -> None:

@@ -72,7 +72,10 @@ def test_it_gets_every_measurement_and_agrees_where_the_belief_is_one_gaussian(d
 def test_it_waits_for_a_heading_and_for_a_new_start(drive: Drive) -> None:
     configuration, _ = drive
     start = configuration.start.model_copy(update={"heading": None, "sigma_heading": None})
-    estimator = Estimator(configuration.model_copy(update={"start": start}), seed=3)
+    honesty = configuration.honesty.model_copy(
+        update={"hypotheses": False}
+    )  # or what is said is the leader's
+    estimator = Estimator(configuration.model_copy(update={"start": start, "honesty": honesty}), seed=3)
     shadow = estimator.accompany(Shadow)
     assert shadow.at(0) is None
     _, ticks = drive
