@@ -1,9 +1,9 @@
 """The deputy: an extended Kalman filter that speaks while not even the fewest particles can be paid for.
 
-Level 4 of the declared order. The filter begins at the particles' moments, takes the same controls and measurements, and
-its belief is what is published. The particles are not weighed: they are drawn anew from it where it moves, for those who
-look at them, and when there is time again. What they were the only ones to hold, a second hypothesis, is lost on the way: one Gaussian is as wide as
-all of it was.
+Level 4 of the declared order. The filter begins at the particles' moments, takes the same controls and measurements,
+and its belief is what is published. The particles are not weighed: they are drawn anew from it where it moves, for
+those who look at them, and when there is time again. A second hypothesis, which only they could hold, is lost on the
+way: one Gaussian is as wide as all of it was.
 """
 
 from __future__ import annotations
