@@ -191,10 +191,10 @@ def search() -> Figure:
                 break
         sampler.finish() if least == 1.0 else None
         at = sampler.points
-        axis.scatter(at[:, 1], at[:, 0], s=3, color=BLUE, alpha=0.4, linewidths=0, rasterized=True)
+        axis.scatter(at[::3, 1], at[::3, 0], s=3, color=BLUE, alpha=0.4, linewidths=0, rasterized=True)
         axis.set_title(f"points, b = {sampler.share:.3g}", fontsize=9)
         under = below[list(axes).index(axis)]
-        under.hist(at[:, 2], bins=60, range=(-math.pi, math.pi), color=BLUE)
+        under.hist(at[:, 2], bins=60, range=(-math.pi, math.pi), color=BLUE, histtype="stepfilled")
         under.axvline(truth[0, 2], color=RED, linewidth=1)
         under.set_xlabel("heading, rad")
         under.set_yticks([])

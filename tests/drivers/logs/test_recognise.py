@@ -21,6 +21,7 @@ CONTENTS = {
     Format.ASC: b"date Sat Sep 30 10:06:13.191 PM 2017\nbase hex  timestamps absolute\n",
     Format.BLF: b"LOGG" + bytes(140),
     Format.TRC: b";$FILEVERSION=1.1\n",
+    Format.RECORDING: b"\x89MCAP0\r\n",
 }
 
 
