@@ -198,6 +198,8 @@ def search() -> Figure:
         under.axvline(truth[0, 2], color=RED, linewidth=1)
         under.set_xlabel("heading, rad")
         under.set_yticks([])
+        axis.set_yticks([])
+        under.grid(visible=False)
     below[0].axis("off")
     for axis in axes:
         axis.plot([e for _, e in BEACONS], [n for n, _ in BEACONS], "^", color="black", markersize=4)

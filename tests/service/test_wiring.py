@@ -93,11 +93,7 @@ def test_everybody_reads_the_configuration_that_was_found_right(wiring: Wiring, 
 def test_descriptors_are_all_that_the_command_names(wiring: Wiring) -> None:
     for program in wiring.programs():
         words = list(program.command)
-        named = {
-            int(word.rpartition("=")[2])
-            for option, word in pairwise(words)
-            if option in DESCRIPTORS
-        }
+        named = {int(word.rpartition("=")[2]) for option, word in pairwise(words) if option in DESCRIPTORS}
         assert named == set(program.descriptors)
 
 
