@@ -31,7 +31,7 @@ position = [{north:.4f}, {east:.4f}, 0.0]
 sigma = [0.1, 0.1, 0.1]
 heading = {heading:.4f}
 sigma_heading = 0.1
-[motion]                          # found on the first half of the run
+[motion]                          # chosen with the whole run in view
 {motion}[[sensor]]
 kind = "range_bearing"
 association = "{association}"
