@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -72,11 +73,11 @@ def _tails(rng: np.random.Generator) -> Columns:
 
 
 @pytest.mark.parametrize("shape", [_ring, _banana, _area, _tails])
-def test_what_is_long_or_wide_is_one(shape: object) -> None:
+def test_what_is_long_or_wide_is_one(shape: Callable[[np.random.Generator], Columns]) -> None:
     """50 samples of each with weights that differ, four looks at each: none was divided in 3,000 tried."""
     rng = np.random.default_rng(2)
     for _ in range(50):
-        columns = shape(rng)  # type: ignore[operator]
+        columns = shape(rng)
         weights = np.exp(rng.normal(0.0, 1.0, 4000)).astype(np.float32)
         assert looked(Hypotheses(4000, 3), columns, weights=weights).count == 1
 
@@ -127,11 +128,15 @@ def test_two_that_meet_become_one_and_keep_the_older_name() -> None:
     hypotheses = looked(Hypotheses(4000, 3), np.concatenate([here, there], axis=1))
     leader = hypotheses.leader
     for east, count in ((4.0, 2), (0.3, 1)):
-        moved = np.concatenate([here, there + np.float32([[0], [east - 14], [0]])], axis=1)
+        moved = np.concatenate([here, there + np.array([[0.0], [east - 14.0], [0.0]], np.float32)], axis=1)
         looked(hypotheses, np.ascontiguousarray(moved), 6)
         assert hypotheses.count == count
     assert hypotheses.leader == leader
     assert not hypotheses.divided
+
+
+def lateral(step: float) -> Columns:
+    return np.array([[step], [0.0], [0.0]], np.float32)
 
 
 def test_mirror_images_that_cross_stay_two_by_their_headings() -> None:
@@ -140,9 +145,7 @@ def test_mirror_images_that_cross_stay_two_by_their_headings() -> None:
     hypotheses = looked(Hypotheses(4000, 3), np.concatenate([here, there], axis=1))
     names = sorted(hypotheses.names.values())
     for step in np.linspace(0.0, 14.0, 60, dtype=np.float32):
-        both = np.concatenate(
-            [here + np.float32([[step], [0], [0]]), there - np.float32([[step], [0], [0]])], axis=1
-        )
+        both = np.concatenate([here + lateral(step), there - lateral(step)], axis=1)
         looked(hypotheses, np.ascontiguousarray(both, np.float32), 1)
         assert sorted(hypotheses.names.values()) == names
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from filters.belief import Displacement
 from service.estimator.carrier import Pose
@@ -23,10 +24,10 @@ def test_the_mean_is_the_leader_s_and_the_covariance_that_of_all_about_it() -> N
     weights = belief.weights / belief.weights.sum(dtype=np.float64)
     columns = np.stack([belief.column(name) for name in belief.names]).astype(np.float64)
     own = columns[1] < 7.0
-    mean = columns[:, own] @ weights[own] / weights[own].sum()
+    mean: NDArray[np.float64] = columns[:, own] @ weights[own] / weights[own].sum()
     np.testing.assert_allclose(moments.mean, mean, atol=2e-4)
     away = columns - mean[:, None]
-    square = (away * weights) @ away.T
+    square: NDArray[np.float64] = (away * weights) @ away.T
     np.testing.assert_allclose(moments.pose_covariance, square[:3, :3], atol=5e-3)
     np.testing.assert_allclose(moments.variance, np.diag(square), atol=5e-3)
     joint = leading.joint(("north", "gyro_bias"))
