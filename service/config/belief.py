@@ -192,7 +192,8 @@ class Sensor(Section):
     correlation_s: NotNegative | None = None
     """Seconds over which its errors stay alike: readings closer together count as one.
 
-    Default: 1 for position, velocity and heading, 0 (every reading counts for itself) for all others."""
+    Default: 1 for position, velocity and heading, 0 (every reading counts for itself) for all others. Of a position
+    above 0, the part of its error that lasts for a minute is added to what is published."""
     bias_sigma: NotNegative = 0.2
     """What an estimated bias may be at the start, in the reading's unit (one standard deviation)."""
     bias_walk: NotNegative = 0.003

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from drivers.sample import Inertial, Sample
+from filters.sensing import PositionMeasurement
 from service.config import Sensor
 from service.estimator.measuring import (
     KINDS,
@@ -72,6 +73,7 @@ class BoundSensor:
         self._log_outlier = self._kind.log_outlier_density(settings)
         given = settings.correlation_s
         self._correlation = self._kind.correlation if given is None else given
+        self._lasts = settings.kind == "position" and self._correlation > 0.0
 
     @property
     def title(self) -> str:
@@ -105,7 +107,12 @@ class BoundSensor:
         name = self.name(sample)
         if isinstance(outcome, str):
             return Refusal(name, outcome)
-        return Measurement(name, self.model, outcome, self._kind.absolute, self._log_outlier, self._repeats)
+        lasting = 0.0
+        if self._lasts and isinstance(outcome, PositionMeasurement) and outcome.sigma_north:
+            lasting = outcome.sigma_north**2 / self._repeats
+        return Measurement(
+            name, self.model, outcome, self._kind.absolute, self._log_outlier, self._repeats, lasting
+        )
 
     def sigma(self, claimed: float | None) -> float:
         """Return the larger of what the configuration and the reading say; each knows of errors the other does not."""

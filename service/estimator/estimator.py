@@ -30,6 +30,7 @@ from service.estimator.fusion import KALMAN, Fusion
 from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
 from service.estimator.jumps import Jumps
+from service.estimator.lasting import Lasting
 from service.estimator.latecomers import latecomers_of
 from service.estimator.mode import mode_of
 from service.estimator.output import Output
@@ -115,7 +116,9 @@ class Estimator:
         if self._tracker is not None:
             self._population.tracker = self._tracker
             self._fusion.companions.append(self._tracker)
-        self._output = Output(self._vehicle, self._filter, self._tracker)
+        lasting = Lasting()
+        self._fusion.companions.append(lasting)
+        self._output = Output(self._vehicle, self._filter, self._tracker, lasting)
         self._sequence = 0
         self._freely = Course()
         self._told: Start | None = None

@@ -11,6 +11,7 @@ from filters.particle import ParticleFilter
 from service.estimate import Estimate, Hypotheses, Triangle, Triple
 from service.estimator.carrier import Pose
 from service.estimator.hypotheses import Tracker
+from service.estimator.lasting import Lasting
 from service.estimator.leading import Leading
 from service.estimator.places import places
 from service.estimator.vehicle import Vehicle
@@ -26,13 +27,21 @@ UNKNOWN_TRIANGLE: Triangle = (None, None, None, None, None, None)
 class Output:
     """Carries moments from the belief's time to now and writes them down.
 
-    With a ``tracker`` they are the leading hypothesis's (:mod:`service.estimator.leading`).
+    With a ``tracker`` they are the leading hypothesis's (:mod:`service.estimator.leading`), with ``lasting`` they are
+    as wide as a receiver's lasting error makes them.
     """
 
-    def __init__(self, vehicle: Vehicle, belief: ParticleFilter[Any], tracker: Tracker | None = None) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        belief: ParticleFilter[Any],
+        tracker: Tracker | None = None,
+        lasting: Lasting | None = None,
+    ) -> None:
         self._vehicle = vehicle
         self._belief = belief
         self._tracker = tracker
+        self._lasting = lasting
         self._pose: Pose | None = None
         self._leading = None if tracker is None else Leading(belief, tracker)
         self._carrier = vehicle.carrier(belief if self._leading is None else self._leading)
@@ -47,6 +56,8 @@ class Output:
         pose = self._carrier.at(belief_time, now)
         if self._leading is not None:
             pose = self._leading.honest(pose, self._carrier.displacement)
+        if self._lasting is not None:
+            pose = self._lasting.widened(pose)
         self._pose = pose
         return pose
 

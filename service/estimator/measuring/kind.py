@@ -126,6 +126,8 @@ class Measurement(NamedTuple):
         Logarithm of the outlier part's density, in the reading's own space.
     repeats : float
         How many readings share one independent error; the sigma of ``value`` has it already.
+    lasting : float
+        Variance of the part of the error that lasts from reading to reading for about a minute, m²; 0: none.
     """
 
     name: str
@@ -134,6 +136,7 @@ class Measurement(NamedTuple):
     absolute: bool
     log_outlier: float
     repeats: float
+    lasting: float = 0.0
 
     def surprise(self, log_mean: float) -> float:
         """Return the probability, 0…1, that the reading is the outlier part's, given its evidence."""

@@ -1,0 +1,76 @@
+"""Widens what is published by what a receiver's lasting error may have done to the belief (:mod:`filters.consider`).
+
+The particles weigh fixes as if their errors were new every second. Published is, beside the particles' own spread, the
+share of the mean that the receiver's error of the last minute has, reckoned along with every absolute measurement.
+"""
+
+from __future__ import annotations
+
+import math
+
+from filters.belief import Evidence
+from filters.consider import LastingError
+from filters.density.gaussian import radius
+from filters.sensing import PositionMeasurement
+from service.estimator.carrier import Pose
+from service.estimator.measuring import Measurement
+from service.estimator.track import SECOND
+
+DURATION = 60.0
+"""Seconds over which reflections and atmosphere change what a receiver says."""
+
+REACH = math.sqrt(-2.0 * math.log(0.05))
+"""Standard deviations of a round Gaussian in the plane that hold 95 %."""
+
+ONE_AXIS = 0.5
+"""A measurement of one dimension (a range) corrects half of the plane."""
+
+
+class Lasting:
+    """A companion of the estimator: hears every measurement and every stretch, and widens the pose."""
+
+    def __init__(self) -> None:
+        self._error = LastingError(DURATION)
+        self._variance = 0.0
+
+    def started(self, time: int) -> None:
+        """Forget: the particles were drawn anew, with all that is unknown of their place."""
+        self._error.restart()
+
+    def moved(self, start: int, end: int) -> None:
+        """Let the receiver's error change."""
+        self._error.wait((end - start) / SECOND)
+
+    def weighed(self, time: int, measured: Measurement, evidence: Evidence, outlier: bool) -> None:
+        """Reckon what a measurement of the place brought of it, or took away."""
+        if outlier or not measured.absolute:
+            return
+        value = measured.value
+        if isinstance(value, PositionMeasurement):
+            gain = self._gain(value.sigma_north or 0.0)
+            if measured.lasting > 0.0:
+                self._error.corrected(gain, measured.lasting)
+            else:
+                self._error.displaced(gain)
+        elif self._error.variance > 0.0:
+            self._error.displaced(
+                ONE_AXIS * self._gain(getattr(value, "sigma", None) or measured.model.sigma)
+            )
+
+    def _gain(self, sigma: float) -> float:
+        return self._variance / (self._variance + sigma * sigma) if self._variance > 0.0 else 0.0
+
+    def widened(self, pose: Pose) -> Pose:
+        """Return ``pose`` with the lasting error's variance on both axes; its own is what the next gains are of."""
+        self._variance = 0.5 * float(pose.covariance[0, 0] + pose.covariance[1, 1])
+        added = self._error.variance
+        if added <= 0.0:
+            return pose
+        own = radius(pose.covariance[:2, :2], 0.95)
+        covariance = pose.covariance.copy()
+        covariance[0, 0] += added
+        covariance[1, 1] += added
+        wider = radius(covariance[:2, :2], 0.95)
+        # with several hypotheses the radius is larger than the covariance alone would have it
+        beyond = math.hypot(pose.radius95, REACH * math.sqrt(added)) if pose.radius95 > 1.01 * own else wider
+        return pose._replace(covariance=covariance, radius95=beyond)
