@@ -74,3 +74,10 @@ class Lasting:
         # with several hypotheses the radius is larger than the covariance alone would have it
         beyond = math.hypot(pose.radius95, REACH * math.sqrt(added)) if pose.radius95 > 1.01 * own else wider
         return pose._replace(covariance=covariance, radius95=beyond)
+
+
+def _sigma(measured: Measurement) -> float:
+    """Return the standard deviation of a measurement as it says, or else as its model says."""
+    claimed: float | None = getattr(measured.value, "sigma", None)
+    usual: float = getattr(measured.model, "sigma", math.inf)
+    return usual if claimed is None else claimed
