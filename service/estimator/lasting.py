@@ -53,9 +53,7 @@ class Lasting:
             else:
                 self._error.displaced(gain)
         elif self._error.variance > 0.0:
-            self._error.displaced(
-                ONE_AXIS * self._gain(getattr(value, "sigma", None) or measured.model.sigma)
-            )
+            self._error.displaced(ONE_AXIS * self._gain(_sigma(measured)))
 
     def _gain(self, sigma: float) -> float:
         return self._variance / (self._variance + sigma * sigma) if self._variance > 0.0 else 0.0
