@@ -42,13 +42,10 @@ class _Sender:
         if gap > LARGEST_GAP:  # it came twice
             return 0
         self.missing.update((self.due + step) % NUMBERS for step in range(gap))
-        self.due = (sequence + 1) % NUMBERS
-        self.missing = {number for number in self.missing if self._is_behind(number)}
+        self.due = due = (sequence + 1) % NUMBERS
+        # should one of the others come now, it would be the next round's and not late
+        self.missing = {number for number in self.missing if (number - due) % NUMBERS > LARGEST_GAP}
         return gap
-
-    def _is_behind(self, number: int) -> bool:
-        """Whether a number, should it come now, would be late rather than the next round's."""
-        return (number - self.due) % NUMBERS > LARGEST_GAP
 
 
 class Sequences:
