@@ -111,7 +111,7 @@ def jam() -> Figure:
     time, off, error, odds = np.array(rows).T
     figure, (above, below) = plt.subplots(2, figsize=(6.8, 4.6), sharex=True, layout="constrained")
     above.plot(time, odds, color=BLUE)
-    for level, words in ((-5.0, "distrusted below"), (2.0, "trusted again above")):
+    for level, words in ((-5.0, "distrusted below"), (1.0, "trusted again above")):
         above.axhline(level, color=GREY, linewidth=0.8, linestyle="--")
         above.text(140.0, level, words, ha="center", va="bottom", color=GREY, fontsize=8)
     above.set_ylabel("log odds of honesty")

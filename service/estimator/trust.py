@@ -37,7 +37,7 @@ from service.estimator.lie import Lie
 from service.estimator.measuring import Measurement
 from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
-from service.estimator.witnesses import SPAN, Testimony, Witnesses, gaussian_of
+from service.estimator.witnesses import SPAN, WILD, Testimony, Witnesses, gaussian_of
 
 MOST_GROUPS, MOST_SENSORS = 16, 32
 """Groups and sensors beyond so many are not judged."""
@@ -45,13 +45,13 @@ MOST_GROUPS, MOST_SENSORS = 16, 32
 LIMIT = 6.0
 """Log odds: one in 400 that a trusted sensor lies."""
 
-FLAGGED, EARNED = -5.0, 2.0
+FLAGGED, EARNED = -5.0, 1.0
 """Log odds below which a group is no longer trusted, and above which it is trusted again."""
 
 CALM = 3.0
 """Log odds from which nobody is under suspicion, and a group has shown that it agrees."""
 
-BEST = 0.64
+BEST = 0.58
 WORST: dict[type, float] = {Position: -8.0, Velocity: -3.0, Range: -2.0, Heading: -2.0}
 """Log odds that a second of readings adds at most, for a sensor and against it: BEST / (BEST - WORST) is the share of
 wild readings that one lives with for ever. Among ranges they are many, among positions few."""
@@ -59,11 +59,17 @@ wild readings that one lives with for ever. Among ranges they are many, among po
 DOUBT, DOUBT_OF_A_LIAR = 8.0, 5.0
 """Nats: of an innovation that speaks neither way, 4 standard deviations; 3.2 for a group that has been caught."""
 
+STRANGE = 4.0
+"""Seconds over which the share of a sensor's wild readings is taken."""
+
+YOUNGEST = 5 * SECOND
+"""Nanoseconds between two beginnings of witnesses at least, when the belief is young."""
+
 LESSON, LEARNING = SECOND, 10.0
 """A reading in so many nanoseconds teaches what errors are usual, and this many as much as one independent one."""
 
-HINDSIGHT = 45 * SECOND
-"""Readings teach only when they are so old and nobody was caught since: a slow drag is not to pass as usual."""
+HINDSIGHT = 60 * SECOND
+"""Readings teach only when they are so old and nobody was caught since: a drag of 0.5 m/s is not to pass as usual."""
 
 MARGIN = 4.0
 """Nats by which a witness may be contradicted more than another group's and still accuse."""
@@ -107,6 +113,8 @@ class Judged:
         When, nanoseconds.
     agreed, flagged : bool
         Whether it has ever earned trust, and whether it has lost it.
+    strange : float
+        Share of its readings that its witness takes for wild, by the noise that they claim; 0 to 1.
     lessons : deque
         Testimonies that the level has yet to learn from, with their times.
     """
@@ -119,6 +127,7 @@ class Judged:
     heard: int | None = None
     agreed: bool = False
     flagged: bool = False
+    strange: float = 0.0
     lessons: deque[tuple[int, Testimony]] = field(default_factory=deque[tuple[int, Testimony]])
 
     def remember(self, testimony: Testimony, honest: bool) -> None:
@@ -128,6 +137,12 @@ class Judged:
             self.lessons.append((now, testimony))
         while self.lessons and now - self.lessons[0][0] > HINDSIGHT:
             self.level.learn(*self.lessons.popleft()[1], 1.0 / LEARNING)
+
+    def compare(self, testimony: Testimony, weight: float) -> None:
+        """Note whether a reading is wild for its witness."""
+        residual, spread, noise = testimony
+        nis = float(residual @ np.linalg.solve(spread + np.diag(noise), residual))
+        self.strange += weight / STRANGE * ((nis > WILD) - self.strange)
 
     def weight(self, time: int) -> float:
         """Return how much of a second has passed since the reading before, at most one, and note this one."""
@@ -143,6 +158,7 @@ class Group:
     place: int
     sensors: dict[str, Judged] = field(default_factory=dict[str, Judged])
     lie: Lie = field(default_factory=Lie)
+    accuser: int | None = None
 
     @property
     def flagged(self) -> bool:
@@ -211,7 +227,7 @@ class Trust:
         self._groups: dict[str, Group] = {}
         self._by_name: dict[str, Group] = {}
         self._sensors = 0
-        self._time = 0
+        self._time = self._since = 0
 
     def log_odds(self, name: str) -> float | None:
         """Return the log odds of the sensor ``name``; ``None`` while it is not judged."""
@@ -223,17 +239,30 @@ class Trust:
 
     def started(self, time: int) -> None:
         """Dismiss the witnesses: they are of another belief."""
-        self._time = time
+        self._time = self._since = time
         self._witnesses.clear()
 
     @property
     def decides(self) -> bool:
-        """Whether the only one who says where the vehicle is once agreed, and has a witness.
+        """Whether it is one alone that disagrees, which once agreed and has a witness.
 
-        Should it disagree with the belief now, no search is to follow it: it may be a lie, and that is decided here.
+        It is when nobody else says where the vehicle is, or when its witness takes its readings for wild and not those
+        of the others. No search is to follow it then: it may be a lie, and that is decided here. A vehicle that was
+        carried away has all witnesses wrong, so a search is held back for as long as it takes them to notice: ten
+        readings of the others.
         """
         placed = [group for group in self._groups.values() if group.absolute and self._recent(group)]
-        return len(placed) == 1 and placed[0].agreed and self._witnesses.judging(placed[0].place) is not None
+        return any(
+            group.agreed
+            and self._witnesses.judging(group.place) is not None
+            and (len(placed) == 1 or self._alone(group))
+            for group in placed
+        )
+
+    def _alone(self, group: Group) -> bool:
+        """Say whether a group contradicts what all others say, and they do not contradict each other."""
+        strange = max(sensor.strange for sensor in group.sensors.values() if sensor.absolute)
+        return not group.flagged and strange > WILD_SHARE and self._accuses(group)
 
     def _recent(self, group: Group) -> bool:
         return any(self._time - (sensor.heard or 0) < RECENT for sensor in group.sensors.values())
@@ -244,8 +273,9 @@ class Trust:
 
         What the search went by may be a lie; should it be, the witnesses still know.
         """
-        live = self._witnesses.bank.live.copy()
+        live, since = self._witnesses.bank.live.copy(), self._since
         yield
+        self._since = since
         for group in self._groups.values():
             if not group.agreed:
                 self._witnesses.dismiss(live, group.place)
@@ -260,7 +290,7 @@ class Trust:
         due = [
             group
             for group, began in zip(trusted, newest, strict=True)
-            if began is None or end - began >= SPAN // 2
+            if began is None or end - began >= min(SPAN // 2, max(YOUNGEST, (end - self._since) // 2))
         ]
         if due and all(self._calm(sensor) for group in trusted for sensor in group.sensors.values()):
             self._begin(due)
@@ -283,11 +313,13 @@ class Trust:
             return True
         sensor = group.sensors[measured.name]
         weight = sensor.weight(time)
-        testimony = self._witnesses.testify(group.place, measured)
-        if testimony is None:
+        said = self._witnesses.testify(group.place, measured)
+        if not said:
             self._begin([group])
         else:
-            self._judge(group, sensor, testimony, weight)
+            testimony = _gravest(group, sensor, said)
+            sensor.compare(testimony, weight)
+            self._judge(group, sensor, testimony, next(iter(said.values())), weight)
             group.lie.hear(time, testimony, weight, sensor.absolute)
         if group.flagged and not sensor.absolute:
             return not sensor.flagged and group.lie.leaves_alone
@@ -326,10 +358,12 @@ class Trust:
             self._by_name[measured.name] = group
         return group
 
-    def _judge(self, group: Group, sensor: Judged, testimony: Testimony, weight: float) -> None:
+    def _judge(
+        self, group: Group, sensor: Judged, testimony: Testimony, eldest: Testimony, weight: float
+    ) -> None:
         doubt = DOUBT_OF_A_LIAR if sensor.flagged else DOUBT
         verdict = sensor.level.information(doubt, testimony.noise) - sensor.level.surprise(*testimony)
-        sensor.remember(testimony, verdict > 0.0 and not sensor.flagged)
+        sensor.remember(eldest, verdict > 0.0 and not sensor.flagged)
         if verdict < 0.0 and not (sensor.agreed and self._accuses(group)):
             return
         self._odds.add(weight * min(BEST, max(sensor.worst, verdict)), sensor.place)
@@ -367,10 +401,9 @@ class Trust:
 
     def _look_back(self, group: Group, caution: float) -> None:
         """Have the belief begin anew as the witness has it, if it was led away from there."""
-        witness = self._witnesses.gaussian(group.place)
-        if witness is None:
+        if group.accuser is None:
             return
-        mean, covariance = witness
+        witness = mean, covariance = self._witnesses.gaussian(group.accuser)
         away = self._belief.moments().mean[:2] - mean[:2]
         spread = caution * covariance[:2, :2]
         if float(away @ np.linalg.solve(spread, away)) > POISONED:
@@ -383,6 +416,18 @@ class Trust:
         gaussian = gaussian_of(self._belief, self._motion.conditional_variances)
         for group in groups:
             self._witnesses.begin(group.place, self._time, *gaussian)
+
+
+def _gravest(group: Group, sensor: Judged, said: dict[int, Testimony]) -> Testimony:
+    """Return what the witness says who is surprised most; once the group is caught, what that one goes on to say.
+
+    The older one has the less to do with the group, the younger one knows better where the vehicle is. That one of two
+    is surprised by an honest sensor is at most twice as likely as of one.
+    """
+    if group.flagged and group.accuser in said:
+        return said[group.accuser]
+    group.accuser = max(said, key=lambda member: sensor.level.surprise(*said[member]))
+    return said[group.accuser]
 
 
 def trust_of(

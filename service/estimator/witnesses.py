@@ -3,8 +3,9 @@
 A witness takes every control and what all other groups measure, so it says where the vehicle is without the group that
 is to be judged. It begins as the belief's own Gaussian; what the group told the belief before that is in it, so it is
 worth something only from a while back. The two of a group begin in turns, ``SPAN / 2`` apart: one of them always is
-between ``SPAN / 2`` and ``SPAN`` old. While anyone is under suspicion none begins anew: the
-belief may be wrong already.
+between ``SPAN / 2`` and ``SPAN`` old. While the belief is young they begin sooner, each when the other is half as old
+as the belief: one that began before gyro and wheels were known soon strays by a metre a second. While anyone is under
+suspicion none begins anew: the belief may be wrong already.
 """
 
 from __future__ import annotations
@@ -133,15 +134,21 @@ class Witnesses:
         member = self.judging(group)
         return 0.0 if member is None else float(self._wildness[member])
 
-    def testify(self, group: int, measured: Measurement) -> Testimony | None:
-        """Say what the group's witness makes of a measurement of it; ``None`` without a witness."""
-        member = self.judging(group)
-        if member is None or type(measured.model) not in BATCHED:
-            return None
+    def testify(self, group: int, measured: Measurement) -> dict[int, Testimony]:
+        """Say what each of the group's witnesses makes of a measurement of it, by member, the older one first."""
+        members = [m for m in range(SLOTS * group, SLOTS * (group + 1)) if self.bank.live[m]]
+        members.sort(key=lambda m: int(self._began[m]))
+        if not members or type(measured.model) not in BATCHED:
+            return {}
         said = self.bank.expect(measured.model, measured.value)
-        jacobian = said.jacobian[member]
-        spread = jacobian @ self.bank.covariance[member] @ jacobian.T
-        return Testimony(said.residual[member], spread, said.noise[member] / measured.repeats)
+        testimonies: dict[int, Testimony] = {}
+        for member in members:
+            jacobian = said.jacobian[member]
+            spread = jacobian @ self.bank.covariance[member] @ jacobian.T
+            testimonies[member] = Testimony(
+                said.residual[member], spread, said.noise[member] / measured.repeats
+            )
+        return testimonies
 
     def begin(self, group: int, time: int, mean: Matrix, covariance: Matrix) -> None:
         """Have a witness of the group begin at ``time`` with this Gaussian, in the place of the older one."""
@@ -152,11 +159,8 @@ class Witnesses:
         self._contradiction[member] = 0.0
         self._wildness[member] = 0.0
 
-    def gaussian(self, group: int) -> tuple[Matrix, Matrix] | None:
-        """Return mean and covariance of the judging witness."""
-        member = self.judging(group)
-        if member is None:
-            return None
+    def gaussian(self, member: int) -> tuple[Matrix, Matrix]:
+        """Return mean and covariance of a witness."""
         return self.bank.mean[member].copy(), self.bank.covariance[member].copy()
 
 

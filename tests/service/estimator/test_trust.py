@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from filters.kalman import Matrix
 from service.estimator import witnesses
 from service.estimator.lie import Lie
 from service.estimator.measuring import Measurement
@@ -23,10 +24,14 @@ Flags = list[tuple[float, str, bool]]
 
 
 def judged(
-    drive: Drive, seconds: float, measure: Callable[[Drive], list[Measurement]]
+    drive: Drive,
+    seconds: float,
+    measure: Callable[[Drive], list[Measurement]],
+    trust: Trust | None = None,
 ) -> tuple[Trust, Flags]:
     """Drive on, judge what is measured, and note when who was flagged and trusted again."""
-    trust = Trust(drive.motion, [], drive.belief, drive.control, seed=drive.seed)
+    if trust is None:
+        trust = Trust(drive.motion, [], drive.belief, drive.control, seed=drive.seed)
     trust.started(drive.now)
     flags: Flags = []
     believed: dict[str, bool] = {}
@@ -127,6 +132,55 @@ def test_who_never_agreed_with_the_belief_is_not_judged() -> None:
     assert flags == []
     assert trust.log_odds("position/bus") is None
     assert trust.log_odds("range/bus/9") is None
+
+
+def test_no_search_follows_one_who_is_alone_against_the_rest() -> None:
+    """A receiver led away beside two beacons is judged; where all disagree at once, the vehicle was carried away."""
+
+    def decided(measure: Callable[[Drive], list[Measurement]], seed: int) -> list[float]:
+        asked: list[tuple[float, bool]] = []
+
+        def watched(drive: Drive) -> list[Measurement]:
+            if drive.time > STEP:
+                asked.append((drive.time, trust.decides))
+            return measure(drive)
+
+        drive = Drive(seed=seed)
+        trust = Trust(drive.motion, [], drive.belief, drive.control, seed=seed)
+        judged(drive, 60.0, watched, trust)
+        return [time for time, decides in asked if decides]
+
+    def led_away(drive: Drive) -> list[Measurement]:
+        away = max(0.0, drive.time - 40.0)
+        return [drive.position((1.5 * away, 0.0)), *(drive.range(k) for k in range(2))]
+
+    times = decided(led_away, 10)
+    assert 40.0 < times[0] < 45.0
+    assert any(time > 50.0 for time in times)
+
+    def carried(drive: Drive) -> list[Measurement]:
+        moved = drive.time > 40.0
+        excess = (60.0, -25.0, 45.0)
+        ranges = [drive.range(k, excess[k] if moved else 0.0) for k in range(3)]
+        return [drive.position((200.0, 90.0) if moved else (0.0, 0.0)), *ranges]
+
+    assert [time for time in decided(carried, 11) if time > 45.0] == []
+
+
+def test_a_young_belief_has_its_witnesses_begin_anew_soon_and_then_ever_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """While the gyro's bias is being learned, a witness that knows nothing of it soon knows little of the place."""
+    began: list[float] = []
+    begin = witnesses.Witnesses.begin
+
+    def noted(self: witnesses.Witnesses, group: int, time: int, mean: Matrix, covariance: Matrix) -> None:
+        began.append(time / SECOND)
+        begin(self, group, time, mean, covariance)
+
+    monkeypatch.setattr(witnesses.Witnesses, "begin", noted)
+    judged(Drive(seed=12), 230.0, lambda drive: [drive.position()])
+    assert began == pytest.approx([0.2, 5.2, 10.4, 20.8, 41.6, 83.2, 143.2, 203.2], abs=0.5)
 
 
 def test_same_seed_same_particles() -> None:
