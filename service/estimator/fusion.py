@@ -117,6 +117,7 @@ class Fusion:
         self.time = time
         for companion in self.companions:
             companion.started(time)
+        self._population.begun(time)
         self._health.restart()
 
     def fuse(self, passed: Passed, afforded: int, course: Course) -> None:

@@ -24,6 +24,13 @@ HEADING_BIN = 0.1
 KLD_ERROR = 0.01
 """Nats. The bins count the pose only; the slow states beside it want several particles in each of its bins."""
 
+COLLAPSED = EffectiveShare(0.1)
+"""What tracking hardly ever comes to: what was measured is far sharper than the belief, as after a wide start. Few
+particles would be left, and of two places one by chance."""
+
+OUTLIVES = 0.25
+"""Share of the particles that is effective when the weights have been tempered for that."""
+
 DEMAND_INTERVAL = SECOND // 5
 GROWTH = 1.25
 """The set grows between resamplings only if the demand is this much larger than the count."""
@@ -72,10 +79,21 @@ class Population:
         return max(self._budget.particles_min, min(wanted, afforded, self._budget.particles_max))
 
     def resample_if_worn(self, afforded: int) -> None:
-        """Normalise the weights, and draw anew where they differ too much (lines 8 to 11 of Table 4.3)."""
-        self._belief.normalize()
-        if RESAMPLING.due(Wear(self._belief.count, self._belief.effective_sample_size, self.still())):
+        """Normalise the weights, and draw anew where they differ too much (lines 8 to 11 of Table 4.3).
+
+        Where next to nothing is left the weights are tempered before, and the copies drawn apart after it
+        (:mod:`filters.rejuvenation`).
+        """
+        belief = self._belief
+        belief.normalize()
+        wear = Wear(belief.count, belief.effective_sample_size, self.still())
+        if RESAMPLING.due(wear):
+            collapsed = COLLAPSED.due(wear)
+            if collapsed:
+                belief.temper(OUTLIVES)
             self.resample(afforded)
+            if collapsed:
+                belief.rejuvenate(HEADING_BIN / POSITION_BIN)
         self._stopwatch.lap("resampling")
 
     def resample(self, afforded: int) -> None:
@@ -93,6 +111,11 @@ class Population:
             self._belief.normalize()
             self.resample(afforded)
             self._stopwatch.lap("resampling")
+
+    def begun(self, now: int) -> None:
+        """Reckon the demand of particles that were just drawn: the first measurement may wear them at once."""
+        self._reckoned = -(2**62)
+        self.reckon(now)
 
     def reckon(self, now: int) -> None:
         """Reckon the demand, if the last time is long enough ago."""
