@@ -421,12 +421,16 @@ class Trust:
 def _gravest(group: Group, sensor: Judged, said: dict[int, Testimony]) -> Testimony:
     """Return what the witness says who is surprised most; once the group is caught, what that one goes on to say.
 
-    The older one has the less to do with the group, the younger one knows better where the vehicle is. That one of two
-    is surprised by an honest sensor is at most twice as likely as of one.
+    The younger one knows better where the vehicle is; the older one has the less to do with the group, and goes first
+    where it speaks against it, too. That one of two is surprised by an honest sensor is at most twice as likely as of
+    one.
     """
     if group.flagged and group.accuser in said:
         return said[group.accuser]
-    group.accuser = max(said, key=lambda member: sensor.level.surprise(*said[member]))
+    surprises = {member: sensor.level.surprise(*testimony) for member, testimony in said.items()}
+    group.accuser = eldest = next(iter(said))
+    if surprises[eldest] < sensor.level.information(DOUBT, said[eldest].noise):
+        group.accuser = max(surprises, key=surprises.__getitem__)
     return said[group.accuser]
 
 
