@@ -44,7 +44,9 @@ class MomentSums:
         size = len(particles.names)
         self._sums = np.zeros((most_blocks, kernels.SUMS + 2 * (size - _POSE)))
         self._reference = np.zeros(kernels.REFERENCE)
-        self._all = kernels.moments.direct
+        self._displace = kernels.displace_reference.direct
+        self._sum_blocks = kernels.sum_blocks.direct
+        self._finish = kernels.finish.direct
 
     def moments(
         self,
@@ -58,25 +60,9 @@ class MomentSums:
         The blocks are summed over in float32; ``given_path`` is what each marginalised column's variance is beyond
         the spread of its means.
         """
-        columns, weights = self._particles.columns, self._weights
         size = len(self._particles.names)
         out = np.empty(2 * size + _POSE * _POSE)
-        if blocks.shared:
-            self._shared(shift, blocks, out)
-        else:
-            forward, right, turn = shift
-            self._all(
-                columns,
-                weights,
-                blocks.bounds,
-                forward,
-                right,
-                turn,
-                self._centre,
-                self._reference,
-                self._sums,
-                out,
-            )
+        self._sum(shift, blocks, out)
         variance = out[size : 2 * size]
         for name, extra in given_path.items():
             if extra > 0.0:
@@ -87,18 +73,24 @@ class MomentSums:
             Moments, (self._particles.names, out[:size], covariance, variance, effective_sample_size)
         )
 
-    def _shared(self, shift: Displacement, blocks: Blocks, out: kernels.Float64Array) -> None:
-        """Do the same with the work on the blocks divided among threads."""
-        forward, right, _ = shift
+    def _sum(self, shift: Displacement, blocks: Blocks, out: kernels.Float64Array) -> None:
+        """Write the moments to ``out``.
+
+        One thread calls the same kernel as several: within another kernel a compiler may sum in another order.
+        """
+        forward, right, turn = shift
         centre, reference, sums = self._centre, self._reference, self._sums
+        columns, weights, bounds = self._particles.columns, self._weights, blocks.bounds
 
         def add(part: int, first: int, last: int) -> None:
-            columns = self._particles.columns
-            kernels.sum_blocks(
-                columns, self._weights, blocks.bounds, first, last, forward, right, centre, reference, sums
-            )
+            sum_blocks(columns, weights, bounds, first, last, forward, right, centre, reference, sums)
 
-        kernels.displace_reference(centre, *shift, reference)
-        blocks.share(add)
-        while not kernels.finish(blocks.number, forward, right, centre, reference, sums, out):
-            blocks.share(add)
+        sum_blocks, number = self._sum_blocks, blocks.number
+        self._displace(centre, forward, right, turn, reference)
+        done = False
+        while not done:
+            if blocks.shared:
+                blocks.share(add)
+            else:
+                sum_blocks(columns, weights, bounds, 0, number, forward, right, centre, reference, sums)
+            done = self._finish(number, forward, right, centre, reference, sums, out)

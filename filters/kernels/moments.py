@@ -224,28 +224,3 @@ def finish(
     out[place + 3], out[place + 4], out[place + 5] = ne, ee, eh
     out[place + 6], out[place + 7], out[place + 8] = nh, eh, hh
     return True
-
-
-@kernel(
-    "void(float32[:, ::1], float32[::1], int64[::1], float64, float64, float64, float32[:, ::1],"
-    "float64[::1], float64[:, ::1], float64[::1])"
-)
-def moments(
-    columns: Float32Array,
-    weights: Float32Array,
-    bounds: Int64Array,
-    forward: float,
-    right: float,
-    turn: float,
-    centre: Float32Array,
-    reference: Float64Array,
-    sums: Float64Array,
-    out: Float64Array,
-) -> None:
-    """All of it in one call, for one thread."""
-    blocks = bounds.size - 1
-    displace_reference(centre, forward, right, turn, reference)
-    done = False
-    while not done:
-        sum_blocks(columns, weights, bounds, 0, blocks, forward, right, centre, reference, sums)
-        done = finish(blocks, forward, right, centre, reference, sums, out)

@@ -100,7 +100,8 @@ def deal(
 
 
 @kernel(
-    "void(float32[:, ::1], float32[:, ::1], float32[::1], float32[::1], int64, int32[::1], int64[::1], float64)",
+    "void(float32[:, ::1], float32[:, ::1], float32[::1], float32[::1], int64, float64, int32[::1], int64[::1],"
+    "float64)",
     exact=True,
 )
 def redraw(
@@ -109,13 +110,16 @@ def redraw(
     weights: Float32Array,
     log_weights: Float32Array,
     count: int,
+    whole: float,
     ancestors: Int32Array,
     bounds: NDArray[np.int64],
     uniform: float,
 ) -> None:
-    """All of it in one call, for one thread: draw from ``count`` sources, deal the copies, make them weigh the same."""
-    given = weights[:count]
-    systematic(given, total(given), uniform, ancestors)
+    """All of it in one call, for one thread: draw from ``count`` sources, deal the copies, make them weigh the same.
+
+    ``whole`` is the sources' :func:`total`, which the compiler might sum in another order in here.
+    """
+    systematic(weights[:count], whole, uniform, ancestors)
     deal(source, target, ancestors, bounds, 0, (ancestors.size + RUN - 1) // RUN)
     for i in range(ancestors.size):
         weights[i] = float32(1.0)

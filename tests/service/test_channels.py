@@ -109,6 +109,7 @@ def test_tags_are_those_the_publisher_knows() -> None:
         channels.SENSORS,
         channels.HEALTH,
         channels.CLOUD,
+        channels.HYPOTHESES,
         channels.PROCESSES,
     }
     assert tags == set(TAGS)

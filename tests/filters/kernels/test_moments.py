@@ -63,7 +63,11 @@ def test_moments_from_any_reference(turn: float, heading: float, far: float) -> 
     sums = np.zeros((blocks, moments.SUMS + 2))
     for _ in range(2):  # the second time from the centre that the first has found
         reference = np.zeros(moments.REFERENCE)
-        moments.moments(columns, w, bounds, 2.0, -1.0, turn, centre, reference, sums, out)
+        moments.displace_reference(centre, 2.0, -1.0, turn, reference)
+        done = False
+        while not done:
+            moments.sum_blocks(columns, w, bounds, 0, blocks, 2.0, -1.0, centre, reference, sums)
+            done = moments.finish(blocks, 2.0, -1.0, centre, reference, sums, out)
         n, e, h, slow = columns.astype(np.float64)
         north = n + 2.0 * np.cos(h) + np.sin(h)
         east = e + 2.0 * np.sin(h) - np.cos(h)

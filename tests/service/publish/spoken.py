@@ -14,10 +14,14 @@ from numpy.typing import NDArray
 from service.config import Configuration
 from service.estimate import (
     Budget,
+    Cell,
     Cloud,
+    Density,
     Estimate,
     Health,
     HealthState,
+    Hypotheses,
+    Hypothesis,
     LinkStatus,
     ProcessStatus,
     Sensors,
@@ -139,6 +143,20 @@ def processes() -> list[ProcessStatus]:
 def tagged(tag: bytes, value: object) -> bytes:
     """Return a datagram as the loop sends it."""
     return tag + msgspec.json.encode(value)
+
+
+def hypotheses() -> Hypotheses:
+    """Return two places, as the loop would tell of them."""
+    near = Hypothesis(1, 0.7, (1.0, -2.0, None), (0.04, 0.0, None, 0.04, None, None), 0.25, 0.01)
+    far = Hypothesis(3, 0.3, (1.0, 9.0, None), (0.09, 0.0, None, 0.09, None, None), None, None)
+    return Hypotheses(1_700_000_000.0, [near, far])
+
+
+def density() -> Density:
+    """Return a density of two columns, with two cells."""
+    cells = [Cell((0.0, 1.0), (0.0, 1.0), 0.75), Cell((1.0, 2.0), (0.0, 1.0), 0.25)]
+    columns, covariance = ["north", "east"], [[0.25, 0.0], [0.0, 0.25]]
+    return Density("histogram", 1_700_000_000.0, 1000, columns, [0.75, 0.5], covariance, cells=cells)
 
 
 def cloud(rows: NDArray[np.float32], time: float = 1_700_000_000.0) -> bytes:

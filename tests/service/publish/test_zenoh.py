@@ -23,8 +23,10 @@ from tests.service.publish.spoken import (
     budget,
     cloud,
     configured,
+    density,
     estimate,
     health,
+    hypotheses,
     processes,
     sensors,
     tagged,
@@ -78,7 +80,7 @@ def test_a_session_that_cannot_be_had_is_tried_ever_more_rarely() -> None:
 
 
 def test_every_key_arrives_as_it_is_declared(start: Start, client: Client, endpoint: str) -> None:
-    """A wildcard subscriber sees all six topics, byte for byte, with encoding, priority and attachment."""
+    """A wildcard subscriber sees all seven topics, byte for byte, with encoding, priority and attachment."""
     daemon = start(endpoint)
     session = client()
     subscriber = session.declare_subscriber(ROOT + "**", zenoh.handlers.RingChannel(1000))
@@ -89,6 +91,7 @@ def test_every_key_arrives_as_it_is_declared(start: Start, client: Client, endpo
         "sensors": tagged(b"S", sensors()),
         "health": tagged(b"H", health(HealthState.TRACKING, "ranges agree")),
         "particles": cloud(rows, time=1234.5),
+        "hypotheses": tagged(b"Y", hypotheses()),
     }
     seen: dict[str, zenoh.Sample] = {}
 
@@ -107,7 +110,7 @@ def test_every_key_arrives_as_it_is_declared(start: Start, client: Client, endpo
         assert sample.congestion_control == zenoh.CongestionControl.DROP
         assert sample.express is False
         assert sample.timestamp is not None
-    for key in ("estimate", "budget", "sensors", "health"):
+    for key in ("estimate", "budget", "sensors", "health", "hypotheses"):
         assert seen[key].payload.to_bytes() == sent[key][1:]
         assert seen[key].attachment is None
     assert seen["estimate/slow"].payload == seen["estimate"].payload
@@ -216,6 +219,8 @@ def test_every_value_fits_the_schema_that_is_told(start: Start, client: Client, 
         "Budget": [msgspec.to_builtins(budget())],
         "Sensors": [msgspec.to_builtins(sensors())],
         "Health": [msgspec.to_builtins(health(HealthState.LOST, "why"))],
+        "Hypotheses": [msgspec.to_builtins(hypotheses())],
+        "Density": [msgspec.to_builtins(density())],
         "Cloud": [{"count": 3, "time": 0.5, "columns": ["north", "east", "heading", "weight"]}],
     }
     assert set(values) == set(schema["values"])
