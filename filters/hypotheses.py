@@ -53,8 +53,8 @@ NEAR = 3.0
 
 LEADS = 4.0
 """How many times the leader's weight another must have to lead."""
-LEAST_PART = 0.1
-"""Least share of the particles that a living hypothesis is given, or an equal part of half of them if that is less."""
+EVEN_PART = 0.5
+"""Share of the particles of which every living hypothesis is given an equal part, at least."""
 
 
 class Slot(NamedTuple):
@@ -166,12 +166,13 @@ class Hypotheses:
     def quotas(self, weights: Float32Array, count: int, drawn: int) -> NDArray[np.int64]:
         """Say how many of ``drawn`` particles each label should have: (most + 1,), which sum to ``drawn``.
 
-        As many as its weight is worth, but no living hypothesis fewer than :data:`LEAST_PART`. Who draws them weighs
-        them by their label's weight over its quota, so that the belief stays what it is.
+        As many as its weight is worth, but no living hypothesis fewer than its part of :data:`EVEN_PART`: how two
+        compare is known as badly as the worse sampled of them. Who draws them weighs them by their label's weight over
+        its quota, so that the belief stays what it is.
         """
         shares = self._shares(weights, count)
         living = [label for label in self._slots if shares[label] > 0.0]
-        least = min(LEAST_PART, 0.5 / max(1, len(living)))
+        least = EVEN_PART / max(1, len(living))
         wanted = shares.copy()
         wanted[living] = np.maximum(wanted[living], least)
         wanted *= drawn / wanted.sum()

@@ -33,6 +33,7 @@ from filters.particle_checks import check_injected, check_shape, check_slow, che
 from filters.particle_moments import MomentSums
 from filters.particle_set import ParticleSet
 from filters.regularization import Rule, root, weighted_covariance
+from filters.rejuvenation import power, spread
 from filters.resampling import Resampler, systematic
 from filters.sensing.model import Learner, Sensor
 
@@ -45,6 +46,7 @@ EVIDENCE_SAMPLE = 2048
 _RESAMPLING_STREAM = 1 << 32
 _INJECTION_STREAM = 2 << 32
 _KERNEL_STREAM = 3 << 32
+_REJUVENATION_STREAM = 4 << 32
 
 NOBODY = -1
 """Ancestor of a particle that was injected."""
@@ -103,6 +105,8 @@ class ParticleFilter(Generic[Control]):
         self.capacity: Final = capacity
         self.collapses = 0
         """How often every weight was zero and the set was kept with equal weights."""
+        self.tempered = 0
+        """How often the weights were raised to a power below one."""
         self._motion = motion
         self._seed = seed
         self._step = 0
@@ -133,8 +137,9 @@ class ParticleFilter(Generic[Control]):
         self._moment_sums = MomentSums(self._particles, self._weights, self._centre, most_blocks)
         self._normal_pairs = random.normal_pairs.direct  # four times a step: worth looking up once
         self._log_sum_of = weights.log_sum.direct
-        self._normalize = weights.normalize.direct
+        self._normalize = weights.normalize
         self._redraw = resampling.redraw.direct
+        self._total_of = resampling.total.direct
         self._log_sum = 0.0
         self._total = self._squares = 0.0
         self._lineage: Int32Array | None = None
@@ -439,7 +444,8 @@ class ParticleFilter(Generic[Control]):
         if scheme is systematic and not self._blocks.shared:
             particles, columns, spare = self._particles, self._particles.columns, self._spare
             logs, bounds = particles.log_weights, self._blocks.bounds
-            self._redraw(columns, spare, self._weights, logs, sources, ancestors, bounds, uniform)
+            whole = self._total_of(self._weights[:sources])
+            self._redraw(columns, spare, self._weights, logs, sources, whole, ancestors, bounds, uniform)
             particles.columns, self._spare = spare, columns
             self._forget_sums()
             self._lay_out_lineage(sources, ancestors)
@@ -589,6 +595,59 @@ class ParticleFilter(Generic[Control]):
                     random.normal_pairs(first, last, step, key, self._noises[0], 0)
                 for row, sigma in zip(rows, spread[:, axis], strict=True):
                     diffuse(self._particles.columns, row, first, last, self._noises[0], axis % 2, sigma)
+
+    def temper(self, share: float) -> float:
+        """Raise the weights to the largest power at most 1 that leaves a share of the particles effective.
+
+        What the measurements said is believed less, so that a belief outlives one that is far sharper than it; see
+        :mod:`filters.rejuvenation`. Nothing happens where enough are effective. ``tempered`` counts the others.
+
+        Parameters
+        ----------
+        share : float
+            The effective sample size over the count, in (0, 1].
+
+        Returns
+        -------
+        float
+            The power.
+
+        Raises
+        ------
+        ValueError
+            A share outside (0, 1].
+        """
+        self._settle()
+        log_weights = self._particles.log_weights
+        exponent = power(log_weights[: self.count], share)
+        if exponent < 1.0:
+            self.tempered += 1
+            log_weights[: self.count] *= np.float32(exponent)
+            self._log_sum = self._log_sum_of(log_weights, self._sampled, self._stride, self._sample)
+            self.normalize()
+        return exponent
+
+    def rejuvenate(self, radians: float = 1.0) -> None:
+        """Draw every pose anew from a kernel about itself, of the covariance of its neighbours.
+
+        Copies come apart, and no further than their like: a ring stays a ring, and two places two
+        (:func:`~filters.rejuvenation.spread`). Every call uses new random numbers only after another
+        resampling. Weights, slow states and lineages stay.
+
+        Parameters
+        ----------
+        radians : float
+            How far a heading is off that counts like a metre, in who is whose neighbour.
+        """
+        columns, count = self._particles.columns, self.count
+        normals = np.empty((4, count), np.float32)
+        step = self._draws & 0xFFFFFFFF
+        for pair in (0, 2):
+            key = random.key(self._seed, _REJUVENATION_STREAM + pair)
+            for first, last in self._blocks.pairs:
+                self._normal_pairs(first, last, step, key, self._noises[0], 0)
+                normals[pair : pair + 2, first:last] = self._noises[0][:2, : last - first]
+        columns[:3, :count] = spread(columns[:3, :count], normals[:3], radians)
 
     def cloud(
         self, count: int, displacement: Displacement | None = None, out: Float32Array | None = None

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from filters.hypotheses import DROPPED, FADES, LEAST_PART, Hypotheses
+from filters.hypotheses import DROPPED, EVEN_PART, FADES, Hypotheses
 from filters.motion import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from filters.sensing import Position, PositionMeasurement, Range, RangeMeasurement
@@ -188,8 +188,9 @@ def test_the_least_part_is_given_and_the_rest_by_weight() -> None:
     weights = np.ones(1000, np.float32)
     weights[500:] = 0.01
     quotas = hypotheses.quotas(weights, 1000, 700)
+    least = EVEN_PART / 2
     assert quotas.sum() == 700
-    assert quotas[hypotheses.labels[999]] == pytest.approx(700 * LEAST_PART / (LEAST_PART + 0.99), abs=2)
+    assert quotas[hypotheses.labels[999]] == pytest.approx(700 * least / (least + 1.0 / 1.01), abs=2)
 
 
 def _started(count: int, seed: int) -> tuple[ParticleFilter[UnicycleControl], Hypotheses]:

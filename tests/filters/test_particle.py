@@ -649,3 +649,57 @@ def test_what_a_kernel_cannot_spread_is_refused(names: list[str], error: type[Ex
     with pytest.raises(error, match=what):
         belief.resample_regularized(names, Preserving())
     assert np.array_equal(belief.columns, before)
+
+
+def test_tempering_leaves_a_share_effective_and_the_order_as_it_was() -> None:
+    belief = started(5000, spread=5.0)
+    belief.weigh(Position(0.1, outliers=0.0), PositionMeasurement(0.3, -0.2))
+    before, worn = belief.weights.copy(), belief.effective_sample_size
+    assert worn < 0.01 * 5000
+    exponent = belief.temper(0.2)
+    assert belief.effective_sample_size == pytest.approx(0.2 * 5000, rel=0.02)
+    assert belief.tempered == 1
+    inside = before > 1e-30
+    np.testing.assert_allclose(belief.weights[inside], before[inside] ** exponent, rtol=1e-3)
+
+
+def test_nothing_is_tempered_that_is_not_worn() -> None:
+    belief = started(1000)
+    belief.weigh(Position(5.0, outliers=0.0), PositionMeasurement(0.3, -0.2))
+    before = belief.weights.copy()
+    assert belief.temper(0.2) == 1.0
+    assert belief.tempered == 0
+    np.testing.assert_array_equal(belief.weights, before)
+
+
+def test_evidence_after_tempering_is_that_of_the_tempered_belief() -> None:
+    belief = started(1500, spread=5.0)
+    belief.weigh(Position(0.1, outliers=0.0), PositionMeasurement(0.3, -0.2))
+    belief.temper(0.2)
+    share = belief.weights / belief.weights.sum(dtype=np.float64)
+    north, east = belief.column("north").copy(), belief.column("east").copy()
+    evidence = belief.weigh(Position(2.0, outliers=0.0), PositionMeasurement(1.0, 1.0))
+    density = np.exp(-((north - 1.0) ** 2 + (east - 1.0) ** 2) / 8.0) / (8.0 * math.pi)
+    assert evidence.log_mean == pytest.approx(math.log(float(share @ density)), abs=1e-4)
+
+
+@pytest.mark.parametrize("block", [32768, 160])
+def test_rejuvenated_copies_differ_and_weights_and_slow_states_stay(block: int) -> None:
+    belief = started(2000, block=block, spread=2.0)
+    belief.weigh(Position(0.2, outliers=0.0), PositionMeasurement(0.3, -0.2))
+    belief.resample()
+    before = {name: belief.column(name).copy() for name in belief.names}
+    alike = np.unique(before["north"]).size
+    belief.rejuvenate(0.4)
+    assert alike < 200
+    assert np.unique(belief.column("north")).size > 1950
+    assert belief.effective_sample_size == 2000.0
+    for name in belief.names[3:]:
+        np.testing.assert_array_equal(belief.column(name), before[name])
+    for name in ("north", "east"):
+        assert float(belief.column(name).std()) == pytest.approx(float(before[name].std()), rel=0.3)
+    again = started(2000, block=block, spread=2.0)
+    again.weigh(Position(0.2, outliers=0.0), PositionMeasurement(0.3, -0.2))
+    again.resample()
+    again.rejuvenate(0.4)
+    np.testing.assert_array_equal(again.columns[:, :2000], belief.columns[:, :2000])
