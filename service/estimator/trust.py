@@ -59,6 +59,11 @@ wild readings that one lives with for ever. Among ranges they are many, among po
 DOUBT, DOUBT_OF_A_LIAR = 8.0, 5.0
 """Nats: of an innovation that speaks neither way, 4 standard deviations; 3.2 for a group that has been caught."""
 
+TOGETHER, SHARED = 10.4, 5.4
+"""Nats for a receiver's position and velocity together, and what the velocity has in them at most. Of four dimensions
+honest readings are as rarely beyond 10.4 as of two beyond 8, and the position must be off by 3 standard deviations.
+Reflections move a position by metres and leave the velocity; one who leads both away tells on himself by both."""
+
 STRANGE = 4.0
 """Seconds over which the share of a sensor's wild readings is taken."""
 
@@ -159,6 +164,16 @@ class Group:
     sensors: dict[str, Judged] = field(default_factory=dict[str, Judged])
     lie: Lie = field(default_factory=Lie)
     accuser: int | None = None
+    pace: float = 0.0
+
+    def note(self, surprise: float, weight: float) -> None:
+        """Note by how many nats a velocity surprised the witness, for the average of the last seconds."""
+        self.pace += weight / STRANGE * (min(SHARED, surprise) - self.pace)
+
+    def support(self, time: int) -> float:
+        """Return the nats that the velocity adds to what speaks against the position; none if it has been silent."""
+        heard = [sensor.heard for sensor in self.sensors.values() if not sensor.absolute and sensor.heard]
+        return self.pace if heard and time - max(heard) < STRANGE * SECOND else 0.0
 
     @property
     def flagged(self) -> bool:
@@ -362,7 +377,13 @@ class Trust:
         self, group: Group, sensor: Judged, testimony: Testimony, eldest: Testimony, weight: float
     ) -> None:
         doubt = DOUBT_OF_A_LIAR if sensor.flagged else DOUBT
-        verdict = sensor.level.information(doubt, testimony.noise) - sensor.level.surprise(*testimony)
+        surprise = sensor.level.surprise(*testimony)
+        verdict = sensor.level.information(doubt, testimony.noise) - surprise
+        if not sensor.absolute:
+            group.note(surprise, weight)
+        elif not sensor.flagged:
+            together = sensor.level.information(TOGETHER, testimony.noise) - surprise
+            verdict = min(verdict, together - group.support(sensor.heard or 0))
         sensor.remember(eldest, verdict > 0.0 and not sensor.flagged)
         if verdict < 0.0 and not (sensor.agreed and self._accuses(group)):
             return

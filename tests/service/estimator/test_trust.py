@@ -88,6 +88,25 @@ def test_a_slow_drag_is_flagged_before_thirty_metres_and_taken_back(rate: float)
     assert drive.error < 8.0
 
 
+def test_a_velocity_that_goes_with_the_drag_has_it_flagged_sooner() -> None:
+    """And one that is wrong alone accuses no position."""
+
+    def flagged(lies: bool, drags: bool) -> float:
+        def measure(drive: Drive) -> list[Measurement]:
+            away = max(0.0, drive.time - 40.0)
+            rate = 2.0 if lies and away else 0.0
+            far = 2.0 * away if drags else 0.0
+            return [drive.position((0.0, far)), drive.velocity((0.0, rate))]
+
+        _, flags = judged(Drive(seed=13), 60.0, measure)
+        return min(
+            (time for time, name, caught in flags if caught and name == "position/bus"), default=math.inf
+        )
+
+    assert flagged(lies=True, drags=True) <= flagged(lies=False, drags=True) - 1.0
+    assert flagged(lies=True, drags=False) == math.inf
+
+
 def test_ten_minutes_of_multipath_flags_nobody() -> None:
     """Errors of 5 m per axis that last a minute, claimed as 3 m."""
     wander = np.zeros(2)
