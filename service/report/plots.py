@@ -277,7 +277,9 @@ def slow_states(canvas: Canvas) -> list[Plot]:
 
 def _slow_state(canvas: Canvas, name: str) -> Plot:
     value, sigma = canvas.series.ticks[f"slow/{name}"], canvas.series.ticks[f"slow_sigma/{name}"]
-    made = canvas.over_time(UNITS.get(name.partition("/")[0], name.replace("_", " ")), name=f"slow-{name}", height=220)
+    made = canvas.over_time(
+        UNITS.get(name.partition("/")[0], name.replace("_", " ")), name=f"slow-{name}", height=220
+    )
     lower, upper = value - 2.0 * sigma, value + 2.0 * sigma
     canvas.source.data[f"lower/{name}"] = lower.astype(np.float32)
     canvas.source.data[f"upper/{name}"] = upper.astype(np.float32)
