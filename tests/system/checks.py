@@ -104,7 +104,7 @@ def unit(name: str) -> str:
 
 
 def processes() -> dict[str, int]:
-    """Return the service's processes: supervisor, loop, publisher, link NAME, each with its number."""
+    """Return the service's processes: supervisor, loop, publisher, keeper, link NAME, each with its number."""
     found: dict[str, int] = {}
     for line in _GROUP.read_text().split() if _GROUP.exists() else []:
         try:

@@ -44,7 +44,7 @@ FOLDER = Path("/root/vehicle")
 ROBOT = FOLDER / "robot.toml"
 ROBOT_INSTALLED = Path("/etc/beliefd/beliefd.toml")
 TRUTH = FOLDER / "truth.csv"
-ROLES = {"supervisor", "loop", "publisher", "link autopilot", "link bus"}
+ROLES = {"supervisor", "loop", "publisher", "keeper", "link autopilot", "link bus"}
 NO_WRITE_EXECUTE = "import numba; print(numba.njit('i8(i8)')(lambda x: x + 1)(1))"
 
 
