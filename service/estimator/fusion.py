@@ -159,22 +159,18 @@ class Fusion:
 
     def _weigh_late(self, latecomers: Latecomers, time: int, waiting: Waiting) -> None:
         assert self.time is not None
-        place = Place(time, self._intake.frame, self._vehicle.down, self._vehicle.controls)
-        measured = waiting.sensor.measure(waiting.sample, place)
-        record = self._intake.records.of(measured.name)
-        if isinstance(measured, Refusal):
-            record.refused[measured.reason] += 1
+        measured = self._measured(time, waiting)
+        if measured is None:
             return
+        record = self._intake.records.of(measured.name)
         if self.trust is not None and (self.trust.log_odds(measured.name) or 0.0) < 0.0:
             record.refused["distrusted"] += 1
             return
         evidence = latecomers.weigh(time, self.time, measured)
         if evidence is None or not evidence.accepted:
             record.refused["late" if evidence is None else "invalid"] += 1
-        elif measured.surprise(evidence.log_mean) > OUTLIER:
-            record.refused["outlier"] += 1
         else:
-            record.accepted += 1
+            record.judge(measured.surprise(evidence.log_mean) > OUTLIER)
 
     def keep_up(self, horizon: int) -> None:
         """Move the belief to ``horizon`` where no measurement has brought it near."""
@@ -207,18 +203,25 @@ class Fusion:
 
     def _weigh(self, time: int, waiting: Waiting) -> None:
         """Weigh the particles by one measurement (line 5 of Table 4.3) and note what it said of the belief."""
-        place = Place(time, self._intake.frame, self._vehicle.down, self._vehicle.controls)
-        measured = waiting.sensor.measure(waiting.sample, place)
-        record = self._intake.records.of(measured.name)
-        if isinstance(measured, Refusal):
-            record.refused[measured.reason] += 1
+        measured = self._measured(time, waiting)
+        if measured is None:
             return
+        record = self._intake.records.of(measured.name)
         if not self._believed(time, waiting, measured):
             record.refused["distrusted"] += 1
             return
         self._vehicle.level(self._acting, waiting.sample.reading, self._intake.frame, measured.repeats)
         self._take_evidence(time, measured, record)
         self._charge("sensing")
+
+    def _measured(self, time: int, waiting: Waiting) -> Measurement | None:
+        """Return what was read in its model's terms; ``None``, and the reason counted, where that cannot be."""
+        place = Place(time, self._intake.frame, self._vehicle.down, self._vehicle.controls)
+        measured = waiting.sensor.measure(waiting.sample, place)
+        if not isinstance(measured, Refusal):
+            return measured
+        self._intake.records.of(measured.name).refused[measured.reason] += 1
+        return None
 
     def _believed(self, time: int, waiting: Waiting, measured: Measurement) -> bool:
         """Ask whether the sensor is trusted; what one that was just found out did to the belief is taken back."""
@@ -249,9 +252,6 @@ class Fusion:
             companion.weighed(time, measured, evidence, surprise > OUTLIER)
         record.innovation = evidence.innovation
         record.last = time
-        if surprise > OUTLIER:
-            record.refused["outlier"] += 1
-        else:
-            record.accepted += 1
+        record.judge(surprise > OUTLIER)
         if measured.absolute:
             self._health.measured(time, measured.name, surprise)

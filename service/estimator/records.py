@@ -24,6 +24,13 @@ class SensorRecord:
     last: int | None = None
     arrivals: int = 0
 
+    def judge(self, outlier: bool) -> None:
+        """Count a reading that was weighed: refused as an outlier, which moves next to nothing, or accepted."""
+        if outlier:
+            self.refused["outlier"] += 1
+        else:
+            self.accepted += 1
+
 
 class SensorRecords:
     """The records of all sensors, bounded in number: names hold beacon numbers, and those come from outside."""
