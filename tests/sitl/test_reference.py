@@ -48,9 +48,9 @@ def test_jamming_is_outvoted_and_said(seed: int) -> None:
     """48 s of fixes up to 2.4 km wrong that claim 0.3 m: the receiver is found out, and health does not hide it."""
     run = run_of(JAM, seed)
     assert run.score.rmse_m is not None
-    assert run.score.rmse_m <= 0.6
+    assert run.score.rmse_m <= 0.5
     assert run.score.max_m is not None
-    assert run.score.max_m <= 2.0
+    assert run.score.max_m <= 1.0
     assert run.score.coverage_95 is not None
     assert run.score.coverage_95 >= 0.93
     refused = next(refused for name, (_, refused) in run.sensors.items() if name.startswith("position"))
@@ -61,7 +61,7 @@ def test_jamming_is_outvoted_and_said(seed: int) -> None:
 def test_the_shadow_stands_beside_and_hears_what_trust_admits() -> None:
     run = run_of(JAM, 2)
     assert run.shadow.score.rmse_m is not None
-    assert run.shadow.score.rmse_m <= 0.5
+    assert run.shadow.score.rmse_m <= 0.4
     assert run.shadow.failure == ""
     used, refused = next(counts for name, counts in run.sensors.items() if name.startswith("position"))
     heard = run.shadow.accepted["position/autopilot"] + run.shadow.gated["position/autopilot"]
