@@ -1,35 +1,26 @@
-"""Recordings of samples (.mcap): what no other log says, or what was understood once and is to be replayed as it was.
-
-One message is one reading: its data is the JSON of :data:`~drivers.sample.AnyReading` as ``sample/<sensor>`` has it on
-Zenoh, ``publish_time`` is when it was measured and ``log_time`` when it was received, nanoseconds on one clock. The
-channel's metadata say by which ``link`` it came and which ``source`` said it. A message on another channel is somebody
-else's, and is left alone. MCAP is a container with chunks that have checksums: https://mcap.dev/spec
-"""
+"""Reading recordings of samples, whatever became of them since they were written."""
 
 from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import msgspec
 import zstandard
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, McapRecord, Message
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
-from mcap.writer import Writer
 
 from drivers.foreign import MalformedSample, decode
-from drivers.sample import AnyReading, LinkReport, Sample
+from drivers.logs.recording.writer import ENCODING, LINK, ORDER, SOURCE, TAKEN, TOPIC
+from drivers.sample import LinkReport, Sample
 
-ENCODING = "json"
-SCHEMA = "beliefd.Reading"
-TOPIC = "sample"
 LARGEST_RECORD = 1 << 28
-CHUNK = 1 << 16
-"""Bytes of a chunk, uncompressed: what one damaged byte costs."""
+SETTLING = 1_000_000_000
+"""Nanoseconds that a sample may have been measured after it came, where a live clock mapping settled."""
 
 _LATEST = 1 << 62
 _BROKEN: tuple[type[Exception], ...] = (
@@ -43,36 +34,31 @@ _BROKEN: tuple[type[Exception], ...] = (
     OverflowError,
     RuntimeError,
 )
-_encoder = msgspec.json.Encoder()
 
 
-def write(path: Path, samples: Iterable[Sample]) -> int:
-    """Write samples, in the order of their arrival, and return how many.
+class Entry(NamedTuple):
+    """One message of a recording, and what its channel says of it; times in nanoseconds.
 
-    Raises
-    ------
-    OSError
-        The file cannot be written.
+    Attributes
+    ----------
+    link, source : str
+        By whom it came, where it is a reading.
+    taken : bool
+        Whether it lies where the loop took it.
     """
-    count = 0
-    with path.open("wb") as file:
-        writer = Writer(file, chunk_size=CHUNK)
-        writer.start(library="beliefd")
-        schema = writer.register_schema(
-            SCHEMA, "jsonschema", _encoder.encode(msgspec.json.schema(AnyReading))
-        )
-        channels: dict[tuple[str, str], int] = {}
-        for sample in samples:
-            said = sample.link, sample.source
-            if said not in channels:
-                metadata = {"link": sample.link, "source": sample.source}
-                topic = f"{TOPIC}/{sample.link}/{sample.source}"
-                channels[said] = writer.register_channel(topic, ENCODING, schema, metadata)
-            data = _encoder.encode(sample.reading)
-            writer.add_message(channels[said], sample.received, data, sample.time, count & 0xFFFFFFFF)
-            count += 1
-        writer.finish()
-    return count
+
+    topic: str
+    log_time: int
+    publish_time: int
+    data: bytes
+    link: str
+    source: str
+    taken: bool
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether it is on a channel of readings."""
+        return self.topic.startswith(f"{TOPIC}/")
 
 
 class RecordingReader:
@@ -117,15 +103,33 @@ class RecordingReader:
         OSError
             The file cannot be read.
         """
+        for entry in self.entries():
+            if not entry.is_reading:
+                self._ignored += 1
+                continue
+            sample = self.sample(entry)
+            if sample is not None:
+                self._received = max(self._received, sample.received)
+                in_line = sample.received == self._received
+                yield sample if in_line else msgspec.structs.replace(sample, received=self._received)
+
+    def entries(self) -> Iterator[Entry]:
+        """Read from the start: every JSON message, in the order of the file.
+
+        Raises
+        ------
+        OSError
+            The file cannot be read.
+        """
         self._begin()
         with self._path.open("rb") as file:
             for record in self._records(file):
                 if isinstance(record, Channel):
                     self._channels[record.id] = record
                 elif isinstance(record, Message):
-                    sample = self._sample(record)
-                    if sample is not None:
-                        yield sample
+                    entry = self._entry(record)
+                    if entry is not None:
+                        yield entry
 
     def _records(self, file: BinaryIO) -> Iterator[McapRecord]:
         """Yield the records, those in chunks one by one."""
@@ -154,29 +158,33 @@ class RecordingReader:
             self._malformed["lost_bytes"] += len(chunk.data)
             return []
 
-    def _sample(self, message: Message) -> Sample | None:
+    def _entry(self, message: Message) -> Entry | None:
         channel = self._channels.get(message.channel_id)
         if channel is None:
             self._malformed["unknown_channel"] += 1
             return None
-        self._kinds[channel.topic] += 1
-        if channel.message_encoding != ENCODING or not channel.topic.startswith(f"{TOPIC}/"):
+        topic, metadata = channel.topic, channel.metadata
+        self._kinds[topic] += 1
+        if channel.message_encoding != ENCODING:
             self._ignored += 1
             return None
+        link, source = metadata.get(LINK, TOPIC), metadata.get(SOURCE, topic)
+        taken = metadata.get(ORDER) == TAKEN
+        return Entry(topic, message.log_time, message.publish_time, message.data, link, source, taken)
+
+    def sample(self, entry: Entry) -> Sample | None:
+        """Return the sample that an entry is, with the times in the file; ``None``, and counted, if it is none."""
         try:
-            reading, _ = decode(message.data)
+            reading, _ = decode(entry.data)
         except MalformedSample as error:
-            self._malformed[f"{channel.topic}.{error}"] += 1
+            self._malformed[f"{entry.topic}.{error}"] += 1
             return None
-        if not 0 <= message.publish_time <= message.log_time <= _LATEST:
-            self._malformed[f"{channel.topic}.time"] += 1
+        latest = entry.log_time + (SETTLING if entry.taken else 0)
+        if not 0 <= entry.publish_time <= latest <= _LATEST:
+            self._malformed[f"{entry.topic}.time"] += 1
             return None
-        self._received = max(self._received, message.log_time)
         self._samples += 1
-        link = channel.metadata.get("link", TOPIC)
-        return Sample(
-            message.publish_time, self._received, link, channel.metadata.get("source", channel.topic), reading
-        )
+        return Sample(entry.publish_time, entry.log_time, entry.link, entry.source, reading)
 
     def report(self) -> LinkReport:
         """Return the totals of the iteration so far."""
