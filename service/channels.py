@@ -71,14 +71,14 @@ class Outlet:
     """The sending end of a queue: never waits, and counts what was refused."""
 
     def __init__(self, end: socket.socket) -> None:
-        self._socket = end
+        self.end = end
         self.dropped = 0
         """Datagrams that the kernel did not take."""
 
-    def send(self, datagram: bytes | bytearray) -> bool:
+    def send(self, datagram: bytes | bytearray | memoryview) -> bool:
         """Send one datagram; False, and counted, when it is not taken: no room, nobody to read, too large."""
         try:
-            self._socket.send(datagram)
+            self.end.send(datagram)
         except OSError:
             self.dropped += 1
             return False

@@ -210,6 +210,18 @@ def read(configuration: Configuration, monotonic: int, unix: int) -> Kept | None
         raise CheckpointError(f"{path} {error}") from error
 
 
+def as_it_was(configuration: Configuration, data: bytes) -> Kept:
+    """Return what :meth:`Writer.encode` was given for the belief of ``configuration``, on the clock of then.
+
+    Raises
+    ------
+    CheckpointError
+        It cannot be used; the text says why.
+    """
+    file = decode(data)
+    return _kept(file, configuration, file.monotonic, file.unix)
+
+
 def _kept(file: _File, configuration: Configuration, monotonic: int, unix: int) -> Kept:
     if file.fingerprint != fingerprint(configuration):
         raise CheckpointError("is of another configuration")

@@ -2,8 +2,8 @@
 
 The particle count, the level and the place of a cut are the only things in a belief that depend on the machine and on
 what else it did. The loop sends them, with the tick's time and how many samples it took from each link, as one small
-datagram per tick; the recording process writes them to a CSV file, and a replay of the same samples by that file
-gives the same bytes.
+datagram per tick; the recording process writes them to a CSV file or, with the samples, to an .mcap. A replay of the same
+samples by them gives the same bytes.
 """
 
 from __future__ import annotations
@@ -12,14 +12,16 @@ import csv
 import struct
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+
+import msgspec
 
 from service.channels import Outlet
 from service.estimator import Cause, Course, Level
+from service.records import DECIDED
 
 COLUMNS = ("tick", "now_ns", "unix_ns", "afforded", "level", "cause", "most", "cut_after", "rested")
 UNCUT = -1
-_FIGURES = struct.Struct("<QqqiiiiiI")
+_FIGURES = struct.Struct("<cQqqiiiiiI")  # a tag first
 _COUNT = struct.Struct("<I")
 
 
@@ -27,7 +29,7 @@ class DecisionLogError(Exception):
     """A file that is no decision log, or one with a hole; the text says where."""
 
 
-class Decided(NamedTuple):
+class Decided(msgspec.Struct, frozen=True):
     """One tick as it was allowed and as it went.
 
     Attributes
@@ -83,7 +85,7 @@ class DecisionSender:
 
     @property
     def dropped(self) -> int:
-        """Ticks that are missing in the log."""
+        """Records for which the queue had no room: what they said is missing in the recording."""
         return self._outlet.dropped
 
     def send(
@@ -92,7 +94,7 @@ class DecisionSender:
         """Send what a tick was allowed, once it is done."""
         cut_after = course.weighed if course.cut else UNCUT
         _FIGURES.pack_into(
-            self._datagram, 0, tick, now, unix, afforded, course.level, course.cause, course.most, cut_after,
+            self._datagram, 0, DECIDED, tick, now, unix, afforded, course.level, course.cause, course.most, cut_after,
             course.rested,
         )  # fmt: skip
         for index, count in enumerate(taken):
@@ -103,7 +105,7 @@ class DecisionSender:
 def decided(datagram: bytes) -> Decided:
     """Return what a datagram of a :class:`DecisionSender` says."""
     taken = tuple(count for (count,) in _COUNT.iter_unpack(datagram[_FIGURES.size :]))
-    tick, now, unix, afforded, level, cause, most, cut_after, rested = _FIGURES.unpack_from(datagram)
+    _, tick, now, unix, afforded, level, cause, most, cut_after, rested = _FIGURES.unpack_from(datagram)
     return Decided(tick, now, unix, afforded, level, cause, most, cut_after, rested, taken)
 
 
@@ -114,7 +116,7 @@ def header(links: Sequence[str]) -> str:
 
 def line(decision: Decided) -> str:
     """Return a tick as a line of the log."""
-    *figures, taken = decision
+    *figures, taken = msgspec.structs.astuple(decision)
     return ",".join(map(str, (*figures, *taken))) + "\n"
 
 

@@ -13,8 +13,9 @@ from collections.abc import Callable
 import msgspec
 
 from drivers.sample import LinkReport, Sample, decode
-from service.channels import LARGEST
+from service.channels import LARGEST, Outlet
 from service.estimate import LinkStatus
+from service.records import TAKEN
 
 MOST_DATAGRAMS = 1024
 """At most so many are taken in one tick, however fast they are dealt with."""
@@ -31,13 +32,16 @@ class Inlet:
         The link's.
     end : socket.socket
         Non-blocking inlet of its queue.
+    records : Outlet, optional
+        Where samples go that a recording is to hold, in the datagrams in which they came.
     """
 
-    def __init__(self, name: str, end: socket.socket) -> None:
+    def __init__(self, name: str, end: socket.socket, records: Outlet | None = None) -> None:
         self.name = name
         self._socket = end
-        self._buffer = bytearray(LARGEST)
-        self._view = memoryview(self._buffer)
+        self._records = records
+        self._record = memoryview(bytearray(TAKEN) + bytearray(LARGEST))
+        self._room = self._record[len(TAKEN) :]
         self._report: LinkReport | None = None
         self._heard: int | None = None
         self.undecodable = 0
@@ -54,7 +58,7 @@ class Inlet:
         self.waiting = 0
         while True:
             try:
-                length = self._socket.recv_into(self._buffer)
+                length = self._socket.recv_into(self._room)
             except BlockingIOError:
                 return
             self.waiting += 1
@@ -74,7 +78,7 @@ class Inlet:
 
     def _take(self, length: int, ingest: Callable[[list[Sample]], None]) -> None:
         try:
-            datagram = decode(self._view[:length])
+            datagram = decode(self._room[:length])
         except msgspec.MsgspecError:
             self.undecodable += 1
             return
@@ -84,6 +88,8 @@ class Inlet:
         self.samples += len(datagram.samples)
         if datagram.samples:
             self._heard = datagram.samples[-1].received
+            if self._records is not None:
+                self._records.send(self._record[: len(TAKEN) + length])
         ingest(datagram.samples)
 
     @property

@@ -11,7 +11,9 @@ from collections.abc import Callable
 
 from pydantic import ValidationError
 
+from service.channels import Outlet
 from service.config import Start
+from service.records import ORDER
 
 LARGEST = 4096
 """Bytes of an order."""
@@ -26,6 +28,8 @@ class Orders:
         Non-blocking inlet of the queue.
     reinitialize : callable
         What a new start is told to.
+    records : Outlet, optional
+        Where orders go that a recording is to hold.
 
     Attributes
     ----------
@@ -33,10 +37,13 @@ class Orders:
         Datagrams that were no order.
     """
 
-    def __init__(self, end: socket.socket, reinitialize: Callable[[Start], None]) -> None:
+    def __init__(
+        self, end: socket.socket, reinitialize: Callable[[Start], None], records: Outlet | None = None
+    ) -> None:
         self.malformed = 0
         self._socket = end
         self._reinitialize = reinitialize
+        self._records = records
 
     def take(self) -> None:
         """Pass on one order, if one waits."""
@@ -50,3 +57,5 @@ class Orders:
             self.malformed += 1
             return
         self._reinitialize(start)
+        if self._records is not None:
+            self._records.send(ORDER + datagram)
