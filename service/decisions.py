@@ -2,8 +2,8 @@
 
 The particle count, the level and the place of a cut are the only things in a belief that depend on the machine and on
 what else it did. The loop sends them, with the tick's time and how many samples it took from each link, as one small
-datagram per tick; the recording process writes them to a CSV file or, with the samples, to an .mcap. A replay of the same
-samples by them gives the same bytes.
+datagram per tick; the recording process writes them to a CSV file or, with the samples, to an .mcap. A replay of the
+same samples by them gives the same bytes.
 """
 
 from __future__ import annotations
@@ -118,6 +118,44 @@ def line(decision: Decided) -> str:
     """Return a tick as a line of the log."""
     *figures, taken = msgspec.structs.astuple(decision)
     return ",".join(map(str, (*figures, *taken))) + "\n"
+
+
+class DecisionFile:
+    """A decision log under construction, at the end of what is there.
+
+    When the loop is started anew its ticks begin at 0 again, and the log gets a new head.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    links : Sequence[str]
+        Names of the links, in the order of the configuration.
+    """
+
+    def __init__(self, path: Path, links: Sequence[str]) -> None:
+        self._file = path.open("a", encoding="utf-8")
+        self._head = header(links)
+        self._headed = False
+
+    def take(self, datagram: bytes) -> None:
+        """Write a line, if the record is a decision."""
+        if datagram[:1] != DECIDED:
+            return
+        decision = decided(datagram)
+        head = "" if self._headed and decision.tick else self._head
+        self._headed = True
+        self._file.write(head + line(decision))
+
+    def flush(self) -> None:
+        """Hand what was written to the operating system."""
+        self._file.flush()
+
+    def close(self) -> None:
+        """Write what is left, and close the file."""
+        self._file.close()
+
+    discard = close
 
 
 def read(path: Path) -> list[Decided]:

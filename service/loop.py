@@ -324,7 +324,7 @@ class Loop:
         drops = {f"link {inlet.name}": inlet.dropped for inlet in self._inlets}
         drops["publisher"] = self._outlet.dropped
         if self._decisions is not None:
-            drops["decisions"] = self._decisions.dropped
+            drops["recording"] = self._decisions.dropped
         if self._checkpoints is not None and self._checkpoints.dropped:
             drops["checkpoints"] = self._checkpoints.dropped
         if self._orders is not None and self._orders.malformed:

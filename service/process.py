@@ -26,6 +26,7 @@ from service.realtime import die_with_parent, freeze_garbage, punctual
 from service.wiring import configuration_from
 
 if TYPE_CHECKING:
+    from service.checkpoint import Kept
     from service.crew import Threads
     from service.estimator import Estimator
 
@@ -42,7 +43,8 @@ def _arguments() -> argparse.ArgumentParser:
     loop.add_argument("--heart", type=int, required=True)
     loop.add_argument("--publisher", type=int, required=True)
     loop.add_argument("--orders", type=int, required=True)
-    loop.add_argument("--decisions", type=int)
+    loop.add_argument("--records", type=int)
+    loop.add_argument("--recorded", action="store_true")
     loop.add_argument("--checkpoints", type=int)
     loop.add_argument("--link", action="append", default=[], metavar="NAME=DESCRIPTOR")
     link = roles.add_parser("link")
@@ -51,7 +53,8 @@ def _arguments() -> argparse.ArgumentParser:
     link.add_argument("--samples", type=int, required=True)
     recorder = roles.add_parser("recorder")
     recorder.add_argument("--records", type=int, required=True)
-    recorder.add_argument("--file", type=Path, required=True)
+    recorder.add_argument("--decisions", type=Path)
+    recorder.add_argument("--recording", type=Path)
     keeper = roles.add_parser("keeper")
     keeper.add_argument("--checkpoints", type=int, required=True)
     for role in (publisher, loop, link, recorder, keeper):
@@ -67,9 +70,12 @@ def _publisher(configuration: Configuration, arguments: argparse.Namespace) -> N
 
 
 def _recorder(configuration: Configuration, arguments: argparse.Namespace) -> None:
-    from service.recorder import run
+    from service.recorder import decision_log, run, run_recording
 
-    run(arguments.file, [link.name for link in configuration.link], inherited(arguments.records))
+    sinks = [run_recording(arguments.recording)] if arguments.recording is not None else []
+    if arguments.decisions is not None:
+        sinks.append(decision_log(arguments.decisions, [link.name for link in configuration.link]))
+    run(sinks, inherited(arguments.records))
 
 
 def _keeper(configuration: Configuration, arguments: argparse.Namespace) -> None:
@@ -111,6 +117,7 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
     from service.inlet import Inlet
     from service.loop import Loop
     from service.orders import Orders
+    from service.records import Doubled
     from service.shapes import shapes_of
 
     heart.announce("rehearsing")
@@ -120,34 +127,45 @@ def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
         _log.warning("loop: %s", refusal)
     crew = _crew(configuration.budget)  # after that: its threads inherit the priority
     links = [argument.rpartition("=") for argument in arguments.link]
-    decisions = None
-    if arguments.decisions is not None:
-        decisions = DecisionSender(Outlet(inherited(arguments.decisions)), len(links))
+    records = None if arguments.records is None else Outlet(inherited(arguments.records))
+    recorded = records if arguments.recorded else None
+    publisher = Outlet(inherited(arguments.publisher))
     estimator = Estimator(configuration, meters, crew=crew)
-    checkpoints = None
+    checkpoints = kept = None
     if arguments.checkpoints is not None:
-        _resume(estimator, configuration)
+        kept = _resume(estimator, configuration)
         checkpoints = Checkpoints(configuration, Outlet(inherited(arguments.checkpoints)), estimator.kept)
     loop = Loop(
         configuration,
         estimator,
         meters,
-        [Inlet(name, inherited(int(descriptor))) for name, _, descriptor in links],
-        Outlet(inherited(arguments.publisher)),
+        [Inlet(name, inherited(int(descriptor)), recorded) for name, _, descriptor in links],
+        publisher if recorded is None else Doubled(publisher, recorded),
         heart,
         shapes,
-        decisions,
-        Orders(inherited(arguments.orders), estimator.reinitialize),
+        None if records is None else DecisionSender(records, len(links)),
+        Orders(inherited(arguments.orders), estimator.reinitialize, recorded),
         checkpoints,
     )
+    if recorded is not None:
+        _tell_beginning(recorded, configuration, kept)
     stopped = _stop_flag()
     freeze_garbage()
     loop.run(stopped)
     _log.info("loop: %s", loop.summary())
 
 
-def _resume(estimator: Estimator, configuration: Configuration) -> None:
-    """Have the belief go on from a checkpoint that is whole and young enough; the journal says what became of it."""
+def _tell_beginning(records: Outlet, configuration: Configuration, kept: Kept | None) -> None:
+    from service.records import begun, tell
+
+    if not tell(records, begun(configuration, kept)):
+        _log.warning(
+            "loop: the recorder has no room for what this run began with: it will replay as samples only"
+        )
+
+
+def _resume(estimator: Estimator, configuration: Configuration) -> Kept | None:
+    """Have the belief go on from a checkpoint that is whole and young enough, and return it; the journal tells it."""
     from service.checkpoint import CheckpointError, read
 
     now = time.monotonic_ns()
@@ -156,8 +174,10 @@ def _resume(estimator: Estimator, configuration: Configuration) -> None:
         if kept is not None:
             estimator.resume(kept)
             _log.info("loop: goes on from a checkpoint of %.1f s ago", (now - kept.time) * 1e-9)
+            return kept
     except (CheckpointError, ValueError) as error:
         _log.warning("loop: the checkpoint is not used: %s; starting as [start] says", error)
+    return None
 
 
 def _crew(budget: Budget) -> Threads | None:

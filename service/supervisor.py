@@ -345,7 +345,7 @@ def _noted(_signal: int, _frame: object) -> None:
     """Let a signal through to the wake-up descriptor."""
 
 
-def run(path: Path, decisions: Path | None = None) -> int:
+def run(path: Path, decisions: Path | None = None, recording: Path | None = None) -> int:
     """Run the daemon that a configuration file describes, until SIGTERM; return the exit status.
 
     Parameters
@@ -354,6 +354,8 @@ def run(path: Path, decisions: Path | None = None) -> int:
         The configuration file.
     decisions : Path, optional
         Where the decision log goes.
+    recording : Path, optional
+        Where the recording of the run goes.
 
     Raises
     ------
@@ -361,7 +363,7 @@ def run(path: Path, decisions: Path | None = None) -> int:
         The file is wrong.
     """
     write_log()
-    with contextlib.closing(Wiring(path, decisions)) as wiring:
+    with contextlib.closing(Wiring(path, decisions, recording)) as wiring:
         return Supervisor(wiring, Notifier()).run()
 
 

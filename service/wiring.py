@@ -55,6 +55,8 @@ class Wiring:
         The configuration file.
     decisions : Path, optional
         Where the decision log goes, at the end of what is there.
+    recording : Path, optional
+        Where the recording of the run goes (.mcap).
 
     Raises
     ------
@@ -62,15 +64,22 @@ class Wiring:
         The file is wrong.
     """
 
-    def __init__(self, path: Path, decisions: Path | None = None) -> None:
+    def __init__(self, path: Path, decisions: Path | None = None, recording: Path | None = None) -> None:
         self._path = path
         self._configuration = load(path)
         self._file = _sealed(self._configuration)
         self._links: dict[str, Pair] = {}
         self._hearts: dict[str, Pair] = {}
         self._estimates = pair(PUBLISHER_QUEUE)
-        self._decisions = decisions
-        self._records = None if decisions is None else pair(RECORDER_QUEUE)
+        self._recording = recording
+        files = {"--decisions": decisions, "--recording": recording}
+        self._recorded = [
+            word
+            for option, file in files.items()
+            if file is not None
+            for word in (option, str(file.absolute()))
+        ]
+        self._records = pair(RECORDER_QUEUE) if self._recorded else None
         self._checkpoints = pair(KEEPER_QUEUE)
         self._orders = pair(ORDER_QUEUE)
         self._keeping = False
@@ -131,12 +140,12 @@ class Wiring:
         )
 
     def _recorder(self, names: list[str]) -> Iterator[Program]:
-        if self._decisions is None or self._records is None:
+        if self._records is None:
             return
         inlet = self._records.inlet.fileno()
         yield Program(
             RECORDER,
-            self._command("recorder", "--records", inlet, "--file", str(self._decisions.absolute())),
+            self._command("recorder", "--records", inlet, *self._recorded),
             (self._file, inlet),
             "\n".join(names),
             environment=_single_threaded(1),
@@ -170,7 +179,8 @@ class Wiring:
         named += ["--orders", str(orders)]
         if self._records is not None:
             queues.append(self._records.outlet.fileno())
-            named += ["--decisions", str(queues[-1])]
+            named += ["--records", str(queues[-1])]
+            named += ["--recorded"] if self._recording is not None else []
         if self._keeping:
             queues.append(self._checkpoints.outlet.fileno())
             named += ["--checkpoints", str(queues[-1])]

@@ -31,7 +31,7 @@ from service.governor import Shape
 from service.inlet import Inlet
 from service.loop import Loop
 from service.publish.inbox import parse
-from service.recorder import Recorder
+from service.recorder import Recorder, decision_log
 
 RATE = 100.0
 BEACONS = {1: (20.0, 10.0), 2: (-5.0, 20.0), 3: (30.0, -15.0)}
@@ -120,7 +120,7 @@ def test_a_recorded_run_gives_the_same_bytes_again(configuration: Configuration,
 
     loop.run(stopped)
     log = tmp_path / "decisions.csv"
-    recorder = Recorder(log, list(links), records.inlet)
+    recorder = Recorder([decision_log(log, list(links))], records.inlet)
     while recorder.step(0):
         pass
     recorder.close()

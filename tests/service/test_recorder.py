@@ -10,7 +10,7 @@ import pytest
 from service.channels import Outlet, pair
 from service.decisions import DecisionSender, read
 from service.estimator import Course
-from service.recorder import Recorder
+from service.recorder import Recorder, decision_log
 
 
 def send(sender: DecisionSender, ticks: int) -> None:
@@ -20,7 +20,7 @@ def send(sender: DecisionSender, ticks: int) -> None:
 
 def test_a_loop_that_starts_anew_gets_a_new_head(tmp_path: Path) -> None:
     ends = pair(1 << 16)
-    recorder = Recorder(tmp_path / "log.csv", ["bus"], ends.inlet)
+    recorder = Recorder([decision_log(tmp_path / "log.csv", ["bus"])], ends.inlet)
     sender = DecisionSender(Outlet(ends.outlet), 1)
     send(sender, 5)
     send(sender, 3)
@@ -35,7 +35,7 @@ def test_a_loop_that_starts_anew_gets_a_new_head(tmp_path: Path) -> None:
 def test_a_full_disk_ends_the_recording_with_one_line(caplog: pytest.LogCaptureFixture) -> None:
     """What comes afterwards is taken from the queue and thrown away: the loop never meets a full one."""
     ends = pair(1 << 20)
-    recorder = Recorder(Path("/dev/full"), ["bus"], ends.inlet)
+    recorder = Recorder([decision_log(Path("/dev/full"), ["bus"])], ends.inlet)
     sender = DecisionSender(Outlet(ends.outlet), 1)
     with caplog.at_level(logging.ERROR):
         for _ in range(5):
@@ -44,7 +44,7 @@ def test_a_full_disk_ends_the_recording_with_one_line(caplog: pytest.LogCaptureF
             recorder.close()
     assert not recorder.recording
     assert [record.getMessage() for record in caplog.records] == [
-        "/dev/full: No space left on device; the recording of decisions ends here"
+        "/dev/full: No space left on device; the recording of decisions ends here, the estimate goes on"
     ]
     assert sender.dropped == 0
     ends.close()
@@ -52,7 +52,7 @@ def test_a_full_disk_ends_the_recording_with_one_line(caplog: pytest.LogCaptureF
 
 def test_a_folder_that_is_not_there_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     ends = pair(1 << 14)
-    recorder = Recorder(tmp_path / "none" / "log.csv", ["bus"], ends.inlet)
+    recorder = Recorder([decision_log(tmp_path / "none" / "log.csv", ["bus"])], ends.inlet)
     recorder.step(0)
     assert "No such file" in caplog.text
     ends.close()

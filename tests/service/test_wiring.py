@@ -169,7 +169,7 @@ def test_a_recorder_runs_where_a_decision_log_is_asked_for(file: Path, tmp_path:
         programs = {program.name: program for program in wiring.programs()}
     recorder, loop = programs["recorder"], programs["loop"]
     assert str(tmp_path / "log.csv") in recorder.command
-    assert int(loop.command[loop.command.index("--decisions") + 1]) in loop.descriptors
+    assert int(loop.command[loop.command.index("--records") + 1]) in loop.descriptors
     assert int(recorder.command[recorder.command.index("--records") + 1]) in recorder.descriptors
     with contextlib.closing(Wiring(file)) as wiring:
         assert "recorder" not in {program.name for program in wiring.programs()}
