@@ -4,6 +4,7 @@ Each is made of the particle filter's own model and takes the same controls and 
 run on the same samples with the same parameters. What they leave out is the outlier part: a Gaussian has a gate.
 """
 
+from filters.linearised.altitude import LinearisedAltitude
 from filters.linearised.bearing import LinearisedBearing
 from filters.linearised.biased_range import LinearisedBiasedRange
 from filters.linearised.constant_velocity import LinearisedConstantVelocity
@@ -12,18 +13,22 @@ from filters.linearised.heading import LinearisedHeading
 from filters.linearised.position import LinearisedPosition
 from filters.linearised.range import LinearisedRange
 from filters.linearised.range_bearing import LinearisedRangeBearing
+from filters.linearised.speed import LinearisedGroundSpeed, LinearisedWheelSpeed
 from filters.linearised.unicycle import LinearisedUnicycle
 from filters.linearised.velocity import LinearisedVelocity
 
 __all__ = [
+    "LinearisedAltitude",
     "LinearisedBearing",
     "LinearisedBiasedRange",
     "LinearisedConstantVelocity",
     "LinearisedDown",
+    "LinearisedGroundSpeed",
     "LinearisedHeading",
     "LinearisedPosition",
     "LinearisedRange",
     "LinearisedRangeBearing",
     "LinearisedUnicycle",
     "LinearisedVelocity",
+    "LinearisedWheelSpeed",
 ]

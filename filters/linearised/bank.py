@@ -31,6 +31,7 @@ from filters.sensing import (
     Velocity,
     VelocityMeasurement,
 )
+from filters.sensing.speed import GYRO_BIAS, ODOMETRY_SCALE, WheelSpeed, WheelSpeedMeasurement
 
 Rows = Mapping[str, int]
 Flags = NDArray[np.bool_]
@@ -278,12 +279,32 @@ def _expect_heading(
     return Expectations(residual, jacobian, np.full_like(residual, sigma**2))
 
 
+def _expect_wheel_speed(
+    sensor: WheelSpeed, rows: Rows, mean: Matrix, measurement: WheelSpeedMeasurement
+) -> Expectations:
+    odometry, gyro = rows[ODOMETRY_SCALE], rows[GYRO_BIAS]
+    turning = measurement.yaw_rate - mean[:, gyro]
+    speed = mean[:, odometry] * measurement.rolled - measurement.right * turning
+    scale = np.ones(len(mean)) if sensor.scale is None else mean[:, rows[sensor.scale]]
+    bias = 0.0 if sensor.bias is None else mean[:, rows[sensor.bias]]
+    jacobian = np.zeros((len(mean), 1, mean.shape[1]))
+    jacobian[:, 0, odometry] = scale * measurement.rolled
+    jacobian[:, 0, gyro] = scale * measurement.right
+    if sensor.scale is not None:
+        jacobian[:, 0, rows[sensor.scale]] = speed
+    if sensor.bias is not None:
+        jacobian[:, 0, rows[sensor.bias]] = 1.0
+    residual = (measurement.speed - scale * speed - bias)[:, None]
+    return Expectations(residual, jacobian, np.full_like(residual, sensor.spread(measurement) ** 2))
+
+
 BATCHED: Mapping[type, Callable[[Any, Rows, Matrix, Any], Expectations]] = MappingProxyType(
     {
         Heading: _expect_heading,
         Position: _expect_position,
         Range: _expect_range,
         Velocity: _expect_velocity,
+        WheelSpeed: _expect_wheel_speed,
     }
 )
 """How each sensor model of the particle filter is expected by all members at once."""

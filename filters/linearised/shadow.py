@@ -17,6 +17,7 @@ import numpy as np
 from filters.belief import STILL, Displacement, Evidence, Joint, Moments
 from filters.extended_kalman import ExtendedKalmanFilter, LinearisedMotion, LinearisedSensor
 from filters.kalman import Matrix, symmetric
+from filters.linearised.altitude import LinearisedAltitude
 from filters.linearised.bearing import LinearisedBearing
 from filters.linearised.biased_range import LinearisedBiasedRange
 from filters.linearised.constant_velocity import LinearisedConstantVelocity
@@ -25,6 +26,7 @@ from filters.linearised.heading import LinearisedHeading
 from filters.linearised.position import LinearisedPosition
 from filters.linearised.range import LinearisedRange
 from filters.linearised.range_bearing import LinearisedRangeBearing
+from filters.linearised.speed import LinearisedGroundSpeed, LinearisedWheelSpeed
 from filters.linearised.unicycle import LinearisedUnicycle
 from filters.linearised.velocity import LinearisedVelocity
 from filters.motion.constant_velocity import ConstantVelocity
@@ -32,19 +34,24 @@ from filters.motion.learned import SlowState
 from filters.motion.model import Motion
 from filters.motion.unicycle import Unicycle
 from filters.sensing import Bearing, Heading, Position, Range, RangeBearing, Sensor, Velocity
+from filters.sensing.altitude import Altitude
 from filters.sensing.biased_range import BiasedRange
 from filters.sensing.down import Down
+from filters.sensing.speed import GroundSpeed, WheelSpeed
 
 LINEARISED: Mapping[type, Callable[[Any], LinearisedSensor[Any]]] = MappingProxyType(
     {
+        Altitude: LinearisedAltitude,
         Bearing: LinearisedBearing,
         BiasedRange: LinearisedBiasedRange,
         Down: LinearisedDown,
+        GroundSpeed: LinearisedGroundSpeed,
         Heading: LinearisedHeading,
         Position: LinearisedPosition,
         Range: LinearisedRange,
         RangeBearing: LinearisedRangeBearing,
         Velocity: LinearisedVelocity,
+        WheelSpeed: LinearisedWheelSpeed,
     }
 )
 """Which linearised model stands for which sensor model."""

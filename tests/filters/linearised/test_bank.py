@@ -24,6 +24,7 @@ from filters.sensing import (
     Velocity,
     VelocityMeasurement,
 )
+from filters.sensing.speed import WheelSpeed, WheelSpeedMeasurement
 
 MOTION = Unicycle(0.1, 0.02, 1e-3, 1e-3, slip_noise=0.05, turn_noise=0.01)
 SLOW = (RandomWalk("range_scale", 1e-3), RandomWalk("range_bias", 1e-3), RandomWalk("heading_bias", 1e-3))
@@ -47,6 +48,11 @@ SENSORS: dict[str, tuple[Any, Callable[[np.random.Generator], Any]]] = {
         Heading(0.1, bias="heading_bias"),
         lambda chance: HeadingMeasurement(3.1 + 0.1 * chance.normal()),
     ),
+    "wheel speed": (
+        WheelSpeed(0.1, scale="range_scale", bias="range_bias"),
+        lambda chance: WheelSpeedMeasurement(1.5 + 0.1 * chance.normal(), 1.4, 0.5, -0.6),
+    ),
+    "plain wheel speed": (WheelSpeed(0.1), lambda chance: WheelSpeedMeasurement(1.5, 1.4, 0.5, 0.6, 0.2)),
     "plain heading": (Heading(0.1), lambda chance: HeadingMeasurement(3.1 + 0.1 * chance.normal(), 0.2)),
 }
 
