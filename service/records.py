@@ -22,6 +22,9 @@ TAKEN = b"L"
 ORDER = b"O"
 DECIDED = b"D"
 
+RUN_TOPIC, ESTIMATE_TOPIC, DECISION_TOPIC, ORDER_TOPIC = "run", "estimate", "decision", "order"
+"""What a recording calls them, beside ``sample/LINK/SOURCE``."""
+
 LARGEST = 256 * 1024
 """Bytes of the largest datagram that the recording process makes room for."""
 

@@ -25,9 +25,17 @@ from service.channels import ESTIMATE
 from service.config import Start
 from service.decisions import Decided, decided
 from service.estimate import Estimate
-from service.records import BEGUN, DECIDED, ORDER, TAKEN, Begun
-
-RUN_TOPIC, ESTIMATE_TOPIC, DECISION_TOPIC, ORDER_TOPIC = "run", "estimate", "decision", "order"
+from service.records import (
+    BEGUN,
+    DECIDED,
+    DECISION_TOPIC,
+    ESTIMATE_TOPIC,
+    ORDER,
+    ORDER_TOPIC,
+    RUN_TOPIC,
+    TAKEN,
+    Begun,
+)
 
 CHUNK = 1 << 18
 """Bytes, uncompressed: some seconds. Each costs the index some memory until the file is closed."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, get_args
 
 from drivers.sample import Sample
@@ -67,8 +67,8 @@ class Blank(NamedTuple):
         return sample.source == self.what
 
 
-class Blanked:
-    """A stream of samples without those that are hidden.
+class Seeing:
+    """What of a stream of samples is seen: all but what is hidden. It is asked in their order.
 
     Attributes
     ----------
@@ -76,18 +76,16 @@ class Blanked:
         How many were taken away so far.
     """
 
-    def __init__(self, samples: Iterable[Sample], blanks: Sequence[Blank]) -> None:
+    def __init__(self, blanks: Sequence[Blank]) -> None:
         self.hidden = 0
-        self._samples = samples
         self._blanks = blanks
+        self._begin: int | None = None
 
-    def __iter__(self) -> Iterator[Sample]:
-        """Yield the samples that no blank hides, in their order."""
-        begin: int | None = None
-        for sample in self._samples:
-            begin = sample.received if begin is None else begin
-            seconds = (sample.received - begin) / SECOND
-            if any(blank.hides(sample, seconds) for blank in self._blanks):
-                self.hidden += 1
-            else:
-                yield sample
+    def __call__(self, sample: Sample) -> bool:
+        """Whether a sample is seen; the first one asked about is the beginning."""
+        if self._begin is None:
+            self._begin = sample.received
+        seconds = (sample.received - self._begin) / SECOND
+        hides = any(blank.hides(sample, seconds) for blank in self._blanks)
+        self.hidden += hides
+        return not hides

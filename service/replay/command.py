@@ -14,6 +14,7 @@ from service.decisions import DecisionLogError
 from service.decisions import read as read_decisions
 from service.replay.bars import run_with_bars
 from service.replay.blanking import Blank
+from service.replay.recorded import RecordedRunError
 from service.replay.run import Plan, Run
 from service.replay.seeds import summary
 from service.replay.site import setting_of
@@ -34,7 +35,7 @@ def plan_of(
     config: Path | None,
     truth: Path | None,
     out: Path | None,
-    particles: int,
+    particles: int | None,
     console: Console,
     blanks: tuple[Blank, ...] = (),
 ) -> Plan:
@@ -42,7 +43,7 @@ def plan_of(
 
     Raises
     ------
-    ConfigurationError, LogError, ValueError
+    ConfigurationError, LogError, RecordedRunError, ValueError
         What the files have wrong, in the user's words.
     """
     setting = setting_of(logs, config, truth)
@@ -51,7 +52,13 @@ def plan_of(
     for blank in blanks:
         console.print(f"[dim]{blank.words}[/dim]", highlight=False)
     known = read_truth(setting.truth) if setting.truth is not None else None
-    return Plan(logs, setting.configuration, particles, known, out, blanks=blanks)
+    again = setting.recorded if len(logs) == 1 and particles is None else None
+    if again is not None:
+        said = f" (the longest of {again.of})" if again.of > 1 else ""
+        console.print(f"[dim]decisions: of that run, {again.ticks} ticks{said}[/dim]", highlight=False)
+    return Plan(
+        logs, setting.configuration, particles or PARTICLES, known, out, blanks=blanks, recorded=again
+    )
 
 
 def write_report(path: Path, plan: Plan, runs: list[Run]) -> None:
@@ -97,15 +104,15 @@ def command(
         if report is not None:
             require_report()
         blanks = tuple(Blank.of(text) for text in blank)
-        plan = plan_of(tuple(logs), config, truth, out, particles or PARTICLES, console, blanks)
+        plan = plan_of(tuple(logs), config, truth, out, particles, console, blanks)
         if decisions is not None:
-            plan = replace(plan, decisions=tuple(read_decisions(decisions)))
+            plan = replace(plan, decisions=tuple(read_decisions(decisions)), recorded=None)
         runs = run_with_bars(replace(plan, traced=None if report is None else 0), list(range(seeds)), console)
         if blank and not any(run.blanked for run in runs):
             console.print("--blank: there was no such sample in that time", style="yellow", highlight=False)
         if report is not None:
             write_report(report, plan, runs)
-    except (LogError, ReportError, DecisionLogError, ValueError, OSError) as error:
+    except (LogError, RecordedRunError, ReportError, DecisionLogError, ValueError, OSError) as error:
         console.print(str(error), style="red", markup=False, highlight=False)
         return 1
     if as_json_object:

@@ -7,7 +7,7 @@ estimates are the ones that the daemon would have published, had it been there w
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import chain
@@ -16,22 +16,22 @@ from pathlib import Path
 import msgspec
 
 from drivers.logs import LogReader
-from drivers.sample import LinkReport, Sample
+from drivers.sample import LinkReport
 from service.checks import Check, Story, Teller
 from service.config import Configuration
 from service.decisions import Decided
-from service.estimator import Course, Estimator
+from service.estimate import Estimate
+from service.estimator import Estimator
 from service.estimator.shadow import Shadow
-from service.replay.blanking import Blank, Blanked
+from service.replay.blanking import Blank, Seeing
+from service.replay.comparing import Again, Comparing
+from service.replay.recorded import RecordedRun, recorded_ticks
 from service.replay.rows import EstimateFile
 from service.replay.sources import LogError, merged, open_log
 from service.replay.tally import ShadowRun, ShadowTally, Tally
+from service.replay.ticks import Tick, ticks_decided, ticks_of
 from service.replay.trace import Trace, Tracer
 from service.score import UNSCORED, Score, Truth, figures, levels
-
-SECOND = 1_000_000_000
-SILENCE_LIMIT = 600 * SECOND
-"""A log with a hole longer than this was spliced; ticks are not made up through it."""
 
 Progress = Callable[[float, float], None]
 """Called with the share of the log that is done, and how many seconds of it that was."""
@@ -55,6 +55,9 @@ class Plan:
         What every tick of a recorded run was allowed; the replay then has its ticks and counts, not ``particles``.
     blanks : tuple[Blank, ...]
         Sensors that are taken away for a time.
+    recorded : RecordedRun or None
+        The recorded run that the log holds, to be done again tick by tick; neither ``particles`` nor ``decisions`` play
+        a part then.
     """
 
     logs: tuple[Path, ...]
@@ -65,6 +68,7 @@ class Plan:
     traced: int | None = None
     decisions: tuple[Decided, ...] | None = None
     blanks: tuple[Blank, ...] = ()
+    recorded: RecordedRun | None = None
 
 
 @dataclass
@@ -77,6 +81,8 @@ class Run:
         What the extended Kalman filter made of the same samples.
     blanked : int
         Samples that the plan took away.
+    again : Again or None
+        How many of the estimates that a recorded run published came out the same, byte for byte.
     trace : Trace or None
         The run tick by tick, where the plan asked for it.
     levels : list[int]
@@ -102,6 +108,7 @@ class Run:
     shadow: ShadowRun
     last_reason: str = ""
     blanked: int = 0
+    again: Again | None = None
     trace: Trace | None = None
     levels: list[int] = field(default_factory=list[int])
     story: Story | None = None
@@ -116,6 +123,7 @@ class Run:
             "late_samples": self.late_samples,
             "dropped": self.dropped,
             "blanked": self.blanked,
+            **({} if self.again is None else {"again": self.again._asdict()}),
             "health": self.health,
             "seconds": round(self.seconds, 3),
             "real_time_factor": round(self.real_time_factor, 1),
@@ -133,44 +141,62 @@ class Run:
         }
 
 
-def ticks_of(samples: Iterator[Sample], rate: float) -> Iterator[tuple[int, list[Sample]]]:
-    """Cut a stream of samples into ticks: each with its time and what was received since the one before."""
-    first = next(samples, None)
-    if first is None:
-        return
-    start, index, batch = first.received, 0, [first]
-    deadline = start
-    for sample in samples:
-        while sample.received > deadline:
-            yield deadline, batch
-            batch = []
-            index += 1
-            deadline = start + round(index * SECOND / rate)
-            if sample.received - deadline > SILENCE_LIMIT:
-                start, index, deadline = sample.received, 0, sample.received
-        batch.append(sample)
-    yield deadline, batch
+class Source:
+    """Where the ticks of a replay come from: the readers of its logs, and what the plan makes of them.
 
+    Parameters
+    ----------
+    plan : Plan
+        What to replay.
 
-def ticks_decided(
-    samples: Iterator[Sample], decisions: Sequence[Decided]
-) -> Iterator[tuple[int, list[Sample], int, Course]]:
-    """Cut a stream of samples into the ticks of a recorded run, by its Unix clock: time, samples, count, course."""
-    waiting = next(samples, None)
-    for decision in decisions:
-        batch: list[Sample] = []
-        while waiting is not None and waiting.received <= decision.unix:
-            batch.append(waiting)
-            waiting = next(samples, None)
-        yield decision.unix, batch, decision.afforded, decision.course()
+    Attributes
+    ----------
+    readers : list[LogReader]
+        One for each log.
+    seen : Seeing
+        What the plan takes away.
+    """
 
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        self.readers = [open_log(path, plan.configuration) for path in plan.logs]
+        self.seen = Seeing(plan.blanks)
+        self._recorded = None if plan.recorded is None else recorded_ticks(plan.recorded, self.readers[0])
 
-def _ticks(samples: Iterator[Sample], plan: Plan) -> Iterator[tuple[int, list[Sample], int, Course | None]]:
-    if plan.decisions is not None:
-        yield from ticks_decided(samples, plan.decisions)
-        return
-    for now, batch in ticks_of(samples, plan.configuration.loop.rate):
-        yield now, batch, plan.particles, None
+    def ticks(self) -> Iterator[Tick]:
+        """Read the logs from their start.
+
+        Raises
+        ------
+        LogError
+            They hold no sample at all.
+        """
+        plan = self._plan
+        if self._recorded is not None:
+            yield from self._recorded.ticks(self.seen)
+            return
+        samples = filter(self.seen, merged(self.readers))
+        first = next(samples, None)
+        if first is None:
+            raise LogError(nothing_in(self.readers, plan.logs))
+        samples = chain([first], samples)
+        if plan.decisions is not None:
+            yield from ticks_decided(samples, plan.decisions)
+            return
+        for now, batch in ticks_of(samples, plan.configuration.loop.rate):
+            yield Tick(now, now, batch, plan.particles)
+
+    def reports(self) -> list[LinkReport]:
+        """Return what the readers counted."""
+        if self._recorded is not None:
+            return [self._recorded.report()]
+        return [reader.report() for reader in self.readers]
+
+    @property
+    def share(self) -> float:
+        """How much of the logs is read."""
+        size = sum(reader.size for reader in self.readers)
+        return sum(reader.position for reader in self.readers) / max(1, size)
 
 
 def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: None) -> Run:
@@ -180,27 +206,29 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
     ------
     LogError
         A log cannot be read, or holds no sample at all.
+    RecordedRunError
+        What a recorded run began with cannot be used.
     """
-    readers = [open_log(path, plan.configuration) for path in plan.logs]
+    source = Source(plan)
     began = time.perf_counter()
-    estimator = Estimator(plan.configuration, seed=seed)
+    estimator = _begun(plan, seed)
     shadow = estimator.accompany(Shadow)
     beside = ShadowTally(shadow)
     tracer = estimator.accompany(lambda vehicle, belief: Tracer()) if plan.traced == seed else None
-    seen = Blanked(merged(readers), plan.blanks)
-    samples = iter(seen)
-    first = next(samples, None)
+    ticks = source.ticks()
+    first = next(ticks, None)
     if first is None:
-        raise LogError(nothing_in(readers, plan.logs))
-    tally, teller = Tally(), Teller()
+        raise LogError(nothing_in(source.readers, plan.logs))
+    tally, teller, again = Tally(), Teller(), Comparing()
     with ExitStack() as stack:
         file = None
         if plan.out is not None:
             file = stack.enter_context(EstimateFile(plan.out / f"estimates_seed{seed}.csv"))
-        now = first.received
-        for now, batch, afforded, course in _ticks(chain([first], samples), plan):
-            estimator.ingest(batch)
-            estimate = estimator.tick(now, now, afforded, course)
+        now = first.now
+        for tick in chain([first], ticks):
+            now = tick.now
+            estimate = _done(estimator, tick)
+            again.add(estimate, tick.published)
             several = estimate.hypotheses > 1
             tally.add(estimate, estimator.hypotheses(estimate.time) if several else None)
             teller.add(estimate)
@@ -210,16 +238,34 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
             if tracer is not None:
                 tracer.add(estimate, shadow.at(now))
             if file is not None:
-                file.write(estimate, now)
+                file.write(estimate, tick.unix)
             if tally.ticks % 256 == 0:
-                progress(_share(readers), tally.ticks / plan.configuration.loop.rate)
+                progress(source.share, tally.ticks / plan.configuration.loop.rate)
     seconds = time.perf_counter() - began
     progress(1.0, tally.ticks / plan.configuration.loop.rate)
-    run = _run(seed, plan, estimator, tally, beside, readers, seconds, now)
-    run.blanked = seen.hidden
+    run = _run(seed, plan, estimator, tally, beside, source.reports(), seconds, now)
+    run.blanked = source.seen.hidden
+    run.again = again.result()
     run.story = teller.story()
     run.trace = None if tracer is None else tracer.trace()
     return run
+
+
+def _begun(plan: Plan, seed: int) -> Estimator:
+    """Return the estimator before its first tick; one of a recorded run goes on from where that one did."""
+    estimator = Estimator(plan.configuration, seed=seed)
+    kept = None if plan.recorded is None else plan.recorded.kept(plan.configuration)
+    if kept is not None:
+        estimator.resume(kept)
+    return estimator
+
+
+def _done(estimator: Estimator, tick: Tick) -> Estimate:
+    """Do one tick."""
+    estimator.ingest(tick.samples)
+    for start in tick.orders:
+        estimator.reinitialize(start)
+    return estimator.tick(tick.now, tick.unix, tick.afforded, tick.course)
 
 
 def _run(
@@ -228,7 +274,7 @@ def _run(
     estimator: Estimator,
     tally: Tally,
     beside: ShadowTally,
-    readers: list[LogReader],
+    reports: list[LinkReport],
     seconds: float,
     now: int,
 ) -> Run:
@@ -248,15 +294,10 @@ def _run(
         ticks=tally.ticks,
         biases=dict(last.biases) if last else {},
         sensors={s.name: (s.accepted, s.refused) for s in estimator.sensors(now)},
-        links=[reader.report() for reader in readers],
+        links=reports,
         shadow=beside.run(plan.truth),
         last_reason=last.reason if last else "",
     )
-
-
-def _share(readers: list[LogReader]) -> float:
-    size = sum(reader.size for reader in readers)
-    return sum(reader.position for reader in readers) / max(1, size)
 
 
 def nothing_in(readers: list[LogReader], logs: tuple[Path, ...]) -> str:

@@ -40,8 +40,9 @@ from service.config import (
     load,
     site,
 )
+from service.replay.recorded import RecordedRun
 from service.replay.scatter import RangeScatter
-from service.replay.sources import kind_of, merged, open_log
+from service.replay.sources import kind_of, merged, open_log, recorded_run
 from service.replay.surroundings import area_about, beacons_of
 
 SITL_GNSS_DELAY_MS = 90.0
@@ -92,6 +93,8 @@ class Setting:
     configuration: Configuration
     truth: Path | None
     notes: list[str] = field(default_factory=list[str])
+    recorded: RecordedRun | None = None
+    """The run that the log holds, of whose configuration this is."""
 
 
 def beside(log: Path, ending: str) -> Path | None:
@@ -127,10 +130,16 @@ def setting_of(logs: tuple[Path, ...], config: Path | None, truth: Path | None) 
         The file is wrong; every error at once.
     LogError
         A log cannot be read.
+    RecordedRunError
+        A recorded run holds a configuration that this version does not understand.
     """
     notes: list[str] = []
+    recorded = recorded_run(logs[0]) if config is None else None
     path = config or beside(logs[0], ".toml")
-    if path is None:
+    if recorded is not None:
+        notes.append(f"configuration: of the run that was recorded in {logs[0]}")
+        configuration = recorded.configuration()
+    elif path is None:
         notes.append("no configuration: taken from the log alone")
         configuration = _filled(Site(), logs, notes)
     else:
@@ -139,7 +148,7 @@ def setting_of(logs: tuple[Path, ...], config: Path | None, truth: Path | None) 
     truth = truth or beside(logs[0], "_truth.csv")
     if truth is not None:
         notes.append(f"truth: {truth}")
-    return Setting(configuration, truth, notes)
+    return Setting(configuration, truth, notes, recorded)
 
 
 def _read(path: Path, logs: tuple[Path, ...], notes: list[str]) -> Configuration:

@@ -16,6 +16,7 @@ from drivers.logs.ulog import UlogReader
 from drivers.sample import Sample
 from service.config import CanLink, Configuration, MavlinkLink
 from service.links import can_settings, mavlink_settings
+from service.replay.recorded import RecordedRun, run_in
 
 
 class LogError(Exception):
@@ -96,6 +97,20 @@ def open_log(path: Path, configuration: Configuration) -> LogReader:
             except ValueError as error:
                 raise LogError(f'link "{link.name}": {error}') from error
     raise LogError(f"{path} is a {form.value}, and the configuration has no link of kind {_LINKS[form]}")
+
+
+def recorded_run(path: Path) -> RecordedRun | None:
+    """Return the recorded run that a log holds, if it is a recording and holds one.
+
+    Raises
+    ------
+    LogError
+        It cannot be read.
+    """
+    if _format_of(path) is not Format.RECORDING:
+        return None
+    _recording(path)  # complains where the library is missing
+    return run_in(path)
 
 
 def _recording(path: Path) -> LogReader:

@@ -102,6 +102,8 @@ def _show_details(run: Run, console: Console) -> None:
             + (f"; not usable: {counts(link.unusable)}" if link.unusable else ""),
             highlight=False,
         )
+    if run.again is not None:
+        console.print(f"  {run.again.words}", highlight=False)
     if run.score.rmse_m is None:
         console.print("  no truth to compare with (--truth CSV)", highlight=False)
     if run.last_reason:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.sample import AnyReading, GeodeticPosition, LocalPosition, Odometer, Range, Sample, Velocity
-from service.replay.blanking import Blank, Blanked
+from service.replay.blanking import Blank, Seeing
 
 SECOND = 1_000_000_000
 
@@ -20,9 +20,9 @@ def sample(seconds: float, reading: AnyReading, source: str = "GPS_RAW_INT") -> 
 
 
 def left(samples: list[Sample], *texts: str) -> list[float]:
-    kept = Blanked(samples, [Blank.of(text) for text in texts])
-    times = [(s.received - samples[0].received) / SECOND for s in kept]
-    assert kept.hidden == len(samples) - len(times)
+    seen = Seeing([Blank.of(text) for text in texts])
+    times = [(s.received - samples[0].received) / SECOND for s in filter(seen, samples)]
+    assert seen.hidden == len(samples) - len(times)
     return times
 
 
