@@ -19,6 +19,7 @@ STAGES = (
     "ingest",
     "motion",
     "sensing",
+    "witnesses",
     "resampling",
     "kalman",
     "search",

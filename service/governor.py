@@ -1,20 +1,16 @@
 """The governor: how many particles the next tick can pay for.
 
 Every stage that works on particles has a *shape*, ``overhead + per_particle * count``, measured once on this
-machine before the first tick (:mod:`service.rehearsal`). What it costs in operation is told as a multiple of
-its shape at the count it worked on; the running high quantile of that multiple is the stage's *scale*. A
-machine that slows down, or a vehicle with more readings per tick than the rehearsal had, moves the scale, and
-with it the whole line.
+machine before the first tick (:mod:`service.rehearsal`): the cost of a tick with one measurement. What it costs in
+operation is divided along its shape into a constant and a slope, which is exact at the count that it was measured
+at, whatever the shape; a wrong one only makes the way to the right count longer. With the stages that no particle
+makes dearer (ingest, witnesses, publishing), a tick is a line over the count, and :class:`service.tick_costs.TickCosts`
+keeps those of the last ticks: what nearly every one of them could have had is the supply.
 
-So the cost model is affine, ``cost = fixed + per_particle * count``: ``fixed`` sums the quantiles of the
-stages that do not depend on particles (ingest, publishing) and the others' scaled overheads, ``per_particle``
-sums their scaled slopes, and ``supply = (budget - fixed) / per_particle``. Motion, sensing, resampling *and*
-extraction are paid from the budget as if each of them ran in every tick, whether or not the last one needed
-it: the tick that does must fit, too. The sum of the stages' quantiles lies above the quantile of their sum
-whenever they do not peak together.
-
-The model is exact at the count it was measured at, whatever the shape: scale times shape is the cost. A wrong
-shape only makes the way to the right count longer.
+Kept are ticks that weighed something: motion, sensing, resampling *and* extraction are paid from the budget as if
+each tick were one of these, for the tick that is must fit, too. A tick without measurements, or one that had to leave
+some out, is kept where even that cost more than there is room for. What the others would have cost nobody knows (the
+first measurement carries what all share), so the remembered costs fade until a whole tick is tried again.
 
 The count does not hunt: it shrinks at once when the supply falls below it, and grows by at most a tenth per
 tick, only while the supply is clearly above it, and never quite up to it.
@@ -41,9 +37,8 @@ from typing import NamedTuple
 
 from service.estimator.course import CROWD, Cause, Level
 from service.quantile import RunningQuantile
+from service.tick_costs import FREE, PROBABILITY, WINDOW, Line, TickCosts
 
-PROBABILITY = 0.95
-WINDOW = 64
 GROWTH = 1.1
 HEADROOM = 0.9
 """Growth stops at this share of the supply; between it and the supply the count stays as it is."""
@@ -66,7 +61,10 @@ WAITING = 0.9
 LEAST_SHARE = 0.25
 """Of the budget, what is spent however long ticks wait: few particles do not make others faster."""
 
-PER_MEASUREMENT = ("motion", "sensing", "resampling")
+WITNESSES = "witnesses"
+"""The stage of what goes beside the particles with each measurement and each move: trust, motion mode, hypotheses."""
+
+PER_MEASUREMENT = ("motion", "sensing", "resampling", WITNESSES)
 """Stages whose cost grows with the number of measurements, too."""
 
 CLOUD = "cloud"
@@ -75,8 +73,19 @@ CLOUD = "cloud"
 KALMAN = "kalman"
 """The stage of level 4; its shape is over measurements, not particles."""
 
+FIXED = ("ingest", "search", "publishing", "other")
+"""Stages whose cost grows neither with the count nor with the measurements."""
+
+AFTER = ("resampling", "extraction")
+"""Stages that work on the particles after they have been weighed."""
+
+_APART = frozenset((*FIXED, CLOUD, KALMAN))
+
 COLD = 2.0
 """Scale before the first tick: between ticks the caches belong to others, in the rehearsal they did not."""
+
+COLD_MEASUREMENTS = 2
+"""Measurements of a tick before the first one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +98,11 @@ class Shape:
     def at(self, count: int) -> float:
         """Return the cost at ``count`` particles, seconds."""
         return self.overhead + self.per_particle * count
+
+    def split(self, seconds: float, count: int) -> Line:
+        """Divide what was measured at ``count`` particles into a constant and a slope, in this shape's proportion."""
+        scale = seconds / self.at(count)
+        return Line(scale * self.overhead, scale * self.per_particle)
 
 
 PROPORTIONAL = Shape(0.0, 1.0)
@@ -141,8 +155,8 @@ class Governor:
     smallest, largest : int
         Bounds of the count, whatever the budget says.
     shapes : Mapping[str, Shape]
-        Of the stages that work on particles, as far as they were measured; and of ``kalman`` over measurements, without
-        which level 4 is never taken.
+        Of the stages that work on particles, in a tick with one measurement, as far as they were measured; and of
+        ``kalman`` over measurements, without which level 4 is never taken.
     period : float
         Seconds from tick to tick.
 
@@ -164,44 +178,78 @@ class Governor:
         self._smallest = smallest
         self._largest = largest
         self._shapes = {stage: shape for stage, shape in shapes.items() if stage != KALMAN}
-        self._scales = {stage: _expecting(COLD) for stage in self._shapes}
+        self._after = {stage: _expecting(COLD) for stage in AFTER if stage in shapes}
         self._deputy = shapes.get(KALMAN)
         self._deputy_scale = _expecting(COLD)
-        self._fixed: dict[str, RunningQuantile] = {}
-        self._each = RunningQuantile(WINDOW, PROBABILITY)
+        self._whole, self._thinned = self._expected(), self._expected()
+        self._fixed = _expecting(0.0)
+        self._publishing = _expecting(0.0)
+        self._cloud = _expecting(0.0)
         self._waits = RunningQuantile(WINDOW, WAITING)
         self._rung = WHOLE
         self._calm = 0
         self._since_shrinking = SETTLE
         self._limit = self._clamped(self.supply)
 
-    def observe(self, stage: str, seconds: float, count: int) -> None:
-        """Learn what a stage cost in a tick that ran it.
+    def _expected(self) -> TickCosts:
+        """Return what ticks are taken to cost before the first one."""
+        each, rest = FREE, FREE
+        for stage, shape in self._shapes.items():
+            line = Line(COLD * shape.overhead, COLD * shape.per_particle)
+            if stage in PER_MEASUREMENT:
+                each = each.plus(line)
+            else:
+                rest = rest.plus(line)
+        return TickCosts(rest, each, COLD_MEASUREMENTS)
+
+    def observe(self, costs: Mapping[str, float], count: int, offered: int, weighed: int) -> None:
+        """Learn what a tick cost.
 
         Parameters
         ----------
-        stage : str
-            Name of the stage.
-        seconds : float
-            Its cost in this tick.
+        costs : Mapping[str, float]
+            Seconds of every stage; 0 for one that did not run.
         count : int
-            Particles it worked on; 0 for a stage whose cost does not depend on them.
+            Particles that it worked on; 0 where it had none, or something else stood in for them.
+        offered, weighed : int
+            Measurements that were due in the tick, and those of them that were looked at.
         """
+        fixed = sum(costs.get(stage, 0.0) for stage in FIXED)
+        self._fixed.add(fixed)
+        self._publishing.add(costs.get("publishing", 0.0))
+        if costs.get(CLOUD, 0.0) > 0.0:
+            self._cloud.add(costs[CLOUD])
         if count <= 0:
-            if stage not in self._fixed:
-                self._fixed[stage] = _expecting(0.0)
-            self._fixed[stage].add(seconds)
             return
-        if stage not in self._scales:
-            self._shapes[stage] = PROPORTIONAL
-            self._scales[stage] = RunningQuantile(WINDOW, PROBABILITY)
-        self._scales[stage].add(seconds / self._shapes[stage].at(count))
+        work, rest = FREE, Line(fixed, 0.0)
+        for stage, seconds in costs.items():
+            if seconds <= 0.0 or stage in _APART:
+                continue
+            line = self._split(stage, seconds, count)
+            if stage in PER_MEASUREMENT:
+                work = work.plus(line)
+            else:
+                rest = rest.plus(line)
+        all_of_it = rest.plus(work)
+        too_dear = all_of_it.at(count) > self.room
+        if weighed:
+            each = work.times(1.0 / weighed)
+            self._thinned.add(rest, each, weighed)
+            if weighed == offered or too_dear:
+                self._whole.add(rest, each, weighed)
+            else:
+                self._whole.fade(FADING)
+        elif too_dear and not offered:
+            self._whole.add(all_of_it, FREE, 0)
+            self._thinned.add(all_of_it, FREE, 0)
 
-    def observe_measurement(self, seconds: float, count: int) -> None:
-        """Learn what one measurement cost in a tick with ``count`` particles, moving and resampling included."""
-        shape = self._work_at(count)
-        if shape > 0.0:
-            self._each.add(seconds / shape)
+    def _split(self, stage: str, seconds: float, count: int) -> Line:
+        if stage == WITNESSES:
+            return Line(seconds, 0.0)
+        shape = self._shapes.get(stage, PROPORTIONAL)
+        if stage in self._after:
+            self._after[stage].add(seconds / shape.at(count))
+        return shape.split(seconds, count)
 
     def observe_deputy(self, seconds: float, measurements: int) -> None:
         """Learn what a tick of the Kalman filter cost, moving and extraction included."""
@@ -213,17 +261,6 @@ class Governor:
         self._waits.add(max(0.0, seconds))
 
     @property
-    def fixed(self) -> float:
-        """Seconds per tick that do not depend on the count."""
-        overheads = (self._shapes[stage].overhead * scale.value for stage, scale in self._scales.items())
-        return sum(cost.value for cost in self._fixed.values()) + sum(overheads)
-
-    @property
-    def per_particle(self) -> float:
-        """Seconds per particle and tick."""
-        return sum(self._shapes[stage].per_particle * scale.value for stage, scale in self._scales.items())
-
-    @property
     def room(self) -> float:
         """Seconds that a tick may spend: the budget, or what others leave of the period if that is less.
 
@@ -231,33 +268,31 @@ class Governor:
         leaves a tick no time leaves a thinner one none either.
         """
         left = PERIOD_SHARE * self._period - self._waits.value
-        least = max(LEAST_SHARE * self._budget, self.fixed + self.per_particle * self._smallest)
+        if left >= self._budget:
+            return self._budget
+        least = max(LEAST_SHARE * self._budget, self._cloud.value + self._whole.at(self._smallest))
         return min(self._budget, max(left, least))
 
     @property
     def supply(self) -> float:
         """Particles that the budget pays for, before bounds and hysteresis."""
-        remaining = max(self.room - self.fixed, 0.0)
-        per_particle = self.per_particle
-        return remaining / per_particle if per_particle > 0.0 else float(self._largest)
+        return self._whole.particles(self.room - self._cloud.value)
 
     def reserve(self, count: int) -> float:
         """Seconds to keep for what follows the weighing of ``count`` particles: resampling, extraction, the sending."""
-        stages = (self._stage_at(stage, count) for stage in ("resampling", "extraction"))
+        after = sum(scale.value * self._shapes[stage].at(count) for stage, scale in self._after.items())
         if self._rung.level is Level.KALMAN and self._deputy is not None:
-            stages = (self._deputy_scale.value * self._deputy.overhead,)
-        sending = (self._fixed[stage].value for stage in ("publishing", CLOUD) if stage in self._fixed)
-        return sum(stages) + sum(sending)
+            after = self._deputy_scale.value * self._deputy.overhead
+        return after + self._publishing.value + self._cloud.value
 
     def decide(self, demand: int) -> Decision:
         """Decide on the next tick, for a belief that needs ``demand`` particles."""
-        supply = self.supply
-        self._follow(supply)
-        count = min(max(demand, self._smallest), int(self._limit))
         # the product that made the room may round to a hair less than it was made from
-        afforded = int(min(self._limit, supply * (1.0 + 1e-9)))
-        fits = afforded >= self._smallest
-        self._climb(WHOLE if fits else self._fitting())
+        supply = self.supply * (1.0 + 1e-9)
+        self._climb(WHOLE if supply >= self._smallest else self._fitting())
+        self._follow(supply if self._rung is WHOLE else float(self._smallest))
+        count = min(max(demand, self._smallest), int(self._limit))
+        afforded = int(min(self._limit, supply))
         self._fade()
         level = max(self._rung.level, Level.FEWER_PARTICLES if count < demand else Level.FULL)
         return Decision(count, afforded, level, self._cause(level), self._rung.most)
@@ -273,17 +308,11 @@ class Governor:
 
     def _fitting(self) -> Rung:
         """Return the first rung on which a tick with the least count fits."""
-        if len(self._each):
-            each = self._each.value * self._work_at(self._smallest)
-        else:
-            each = sum(self._stage_at(stage, self._smallest) for stage in PER_MEASUREMENT)
-        fixed = sum(cost.value for stage, cost in self._fixed.items() if stage != CLOUD)
-        left = self.room - fixed - self._stage_at("extraction", self._smallest)
-        cloud = self._fixed[CLOUD].value if CLOUD in self._fixed else 0.0
-        for level, spare in ((Level.THINNED, left - cloud), (Level.NO_CLOUD, left)):
-            if spare >= each:
-                return Rung(level, min(CROWD, int(spare / each) if each > 0.0 else CROWD))
-        deputised = self._deputised(self.room - fixed)
+        for level, spare in ((Level.THINNED, self.room - self._cloud.value), (Level.NO_CLOUD, self.room)):
+            most = self._thinned.measurements(spare, self._smallest)
+            if most >= 1.0:
+                return Rung(level, min(CROWD, int(most)))
+        deputised = self._deputised(self.room - self._fixed.value)
         return Rung(Level.KALMAN, deputised) if deputised else Rung(Level.PREDICTION_ONLY, 0)
 
     def _deputised(self, left: float) -> int:
@@ -308,26 +337,15 @@ class Governor:
         """Let the cost of what this rung leaves out fade; with the Kalman filter the particles do nothing at all."""
         if self._rung.level < Level.KALMAN or self._calm:
             return  # everything is done, or soon will be
-        self._each.scale(FADING)
-        resting = ("sensing", "resampling")
-        if self._rung.level is Level.KALMAN:
-            resting = tuple(self._scales)
-        else:
+        self._whole.fade(FADING)
+        self._thinned.fade(FADING)
+        if self._rung.level is not Level.KALMAN:
             self._deputy_scale.scale(FADING)
-        for stage in resting:
-            if stage in self._scales:
-                self._scales[stage].scale(FADING)
 
     def _cause(self, level: Level) -> Cause:
         if level is Level.FULL:
             return Cause.NONE
         return Cause.PROCESSOR if self.room < self._budget else Cause.BUDGET
-
-    def _stage_at(self, stage: str, count: int) -> float:
-        return self._scales[stage].value * self._shapes[stage].at(count) if stage in self._scales else 0.0
-
-    def _work_at(self, count: int) -> float:
-        return sum(self._shapes[stage].at(count) for stage in PER_MEASUREMENT if stage in self._shapes)
 
     def _clamped(self, count: float) -> float:
         return min(max(count, float(self._smallest)), float(self._largest))

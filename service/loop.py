@@ -24,7 +24,7 @@ from service.debt import Debt
 from service.decisions import DecisionSender
 from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Hypotheses, Sensors, SensorStatus
 from service.estimator.course import Course, Level
-from service.governor import CLOUD, KALMAN, PER_MEASUREMENT, Decision, Governor, Shape
+from service.governor import CLOUD, KALMAN, Decision, Governor, Shape
 from service.inlet import Inlet
 from service.orders import Orders
 from service.schedule import NANOSECONDS, Schedule
@@ -37,7 +37,6 @@ HYPOTHESES_RATE = 10.0
 CLOUD_RATE = 5.0
 
 _OTHER = "other"
-_FIXED_STAGES = ("ingest", "search", "publishing", _OTHER)
 
 
 class Estimator(Protocol):
@@ -252,28 +251,14 @@ class Loop:
         description = self._encoder.encode(Cloud(len(rows), estimate.time))
         self._outlet.send(cloud(description, np.ascontiguousarray(rows, "<f4").tobytes()))
         self._meters.lap(CLOUD)
-        self._governor.observe(CLOUD, self._meters.costs[CLOUD], 0)
 
     def _learn(self, particles: int) -> None:
-        """Tell the governor what the tick cost, and what it would have cost with every measurement weighed."""
-        course, work = self._course, 0.0
-        for stage, seconds in self._meters.costs.items():
-            if stage in _FIXED_STAGES:
-                self._governor.observe(stage, seconds, 0)
-            elif stage == KALMAN:
-                if course.deputised:
-                    self._governor.observe_deputy(seconds, course.weighed)
-            elif stage == CLOUD or not particles or seconds <= 0.0:
-                continue
-            elif stage in PER_MEASUREMENT:
-                work += seconds
-                if course.weighed or not course.offered:
-                    whole = course.offered / course.weighed if course.weighed else 1.0
-                    self._governor.observe(stage, seconds * whole, particles)
-            else:
-                self._governor.observe(stage, seconds, particles)
-        if particles and course.weighed:
-            self._governor.observe_measurement(work / course.weighed, particles)
+        """Tell the governor what the tick cost."""
+        course, costs = self._course, self._meters.costs
+        if course.deputised:
+            self._governor.observe_deputy(costs[KALMAN], course.weighed)
+            particles = 0
+        self._governor.observe(costs, particles, course.offered, course.weighed)
         self._meters.lap(_OTHER)
 
     def _account(self, lateness: float, duration: float) -> None:

@@ -34,7 +34,7 @@ from drivers.sample import (
 from service.budget import Meters
 from service.config import Configuration, Sensor, Start
 from service.estimator import Cause, Course, Estimator, Level
-from service.governor import KALMAN, WHOLE, Rung, Shape
+from service.governor import KALMAN, PER_MEASUREMENT, WHOLE, WITNESSES, Rung, Shape
 
 PARTICLE_STAGES = ("motion", "sensing", "resampling", "extraction")
 
@@ -59,7 +59,11 @@ _LEAST = 1e-11
 
 
 def rehearse(configuration: Configuration) -> dict[str, Shape]:
-    """Run a second of ticks with few and with many particles, and with none; return the shapes of the stages."""
+    """Run a second of ticks with few and with many particles, and with none; return the shapes of the stages.
+
+    Each tick has a reading of every sensor. What grows with their number is divided by it: the shapes are those of a
+    tick with one measurement.
+    """
     few = configuration.budget.particles_min
     many = min(configuration.budget.particles_max, max(MANY, 2 * few))
     cheap, dear = costs(configuration, few), costs(configuration, many)
@@ -68,12 +72,23 @@ def rehearse(configuration: Configuration) -> dict[str, Shape]:
         for stage in PARTICLE_STAGES
         if cheap[stage] > 0.0 and dear[stage] > 0.0
     }
+    if cheap[WITNESSES] > 0.0:
+        shapes[WITNESSES] = Shape(cheap[WITNESSES], 0.0)
+    measurements = max(1, _measurements(configuration))
+    for stage in PER_MEASUREMENT:
+        if stage in shapes:
+            whole = shapes[stage]
+            shapes[stage] = Shape(whole.overhead / measurements, whole.per_particle / measurements)
     return shapes | deputy(configuration)
+
+
+def _measurements(configuration: Configuration) -> int:
+    return sum(len(_readings(sensor, configuration, 0.0)) for sensor in configuration.sensor)
 
 
 def deputy(configuration: Configuration) -> dict[str, Shape]:
     """Return the shape of the Kalman filter that stands in for the particles, over the measurements of a tick."""
-    measurements = sum(len(_readings(sensor, configuration, 0.0)) for sensor in configuration.sensor)
+    measurements = _measurements(configuration)
     if measurements == 0:
         return {}
     few = configuration.budget.particles_min
@@ -105,7 +120,7 @@ def costs(
     budget = configuration.budget.model_copy(update={"particles_min": count, "particles_max": count})
     estimator = Estimator(configuration.model_copy(update={"start": start, "budget": budget}), meters)
     encoder = msgspec.json.Encoder()
-    seconds: dict[str, list[float]] = {stage: [] for stage in (*PARTICLE_STAGES, KALMAN)}
+    seconds: dict[str, list[float]] = {stage: [] for stage in (*PARTICLE_STAGES, WITNESSES, KALMAN)}
     course = Course()
     now = 0
     for tick in range(pace.ticks):

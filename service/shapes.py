@@ -19,6 +19,9 @@ from service.config import Configuration
 from service.governor import Shape
 from service.rehearsal import rehearse, touch
 
+_PREFIX = "costs"
+"""Changes when the shapes' meaning does: what an older version has kept is not taken for this one's."""
+
 _KEPT = 16
 """Files that a folder keeps: the newest."""
 
@@ -30,7 +33,7 @@ def shapes_of(configuration: Configuration, folder: Path) -> dict[str, Shape]:
 
     Either way every kernel, import and page that a tick needs has been used once.
     """
-    path = folder / f"shapes-{_digest(configuration)}.json"
+    path = folder / f"{_PREFIX}-{_digest(configuration)}.json"
     kept = _read(path)
     if kept:
         touch(configuration)
@@ -51,7 +54,7 @@ def _read(path: Path) -> dict[str, Shape]:
     except (OSError, msgspec.DecodeError):
         return {}
     whole = all(
-        isfinite(shape.at(1)) and shape.overhead >= 0.0 and shape.per_particle > 0.0
+        isfinite(shape.at(1)) and shape.overhead >= 0.0 and shape.per_particle >= 0.0 and shape.at(1) > 0.0
         for shape in shapes.values()
     )
     return shapes if whole else {}
@@ -64,7 +67,7 @@ def _keep(path: Path, shapes: dict[str, Shape]) -> None:
         part.write_bytes(msgspec.json.encode(shapes))
         part.replace(path)
         newest = sorted(
-            path.parent.glob("shapes-*.json"), key=lambda found: found.stat().st_mtime, reverse=True
+            path.parent.glob(f"{_PREFIX}-*.json"), key=lambda found: found.stat().st_mtime, reverse=True
         )
         for stale in newest[_KEPT:]:
             stale.unlink(missing_ok=True)

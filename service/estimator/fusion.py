@@ -37,6 +37,9 @@ FEW = 8
 KALMAN = "kalman"
 """The stage that the deputy's work is charged to, whatever it is."""
 
+WITNESSES = "witnesses"
+"""The stage of those who go beside the particles: who watches over the sensors, the motion and the hypotheses."""
+
 OUTLIER = 0.5
 """Probability of being the outlier part's from which a measurement counts as refused: it moved next to nothing."""
 
@@ -152,9 +155,8 @@ class Fusion:
         due = self.latecomers.due()
         for time, waiting in due:
             self._weigh_late(self.latecomers, time, waiting)
-            self._population.resample_if_worn(afforded)
-        if due:
             self._stopwatch.lap("sensing")
+            self._population.resample_if_worn(afforded)
         self.latecomers.keep(self.time)
 
     def _weigh_late(self, latecomers: Latecomers, time: int, waiting: Waiting) -> None:
@@ -185,10 +187,11 @@ class Fusion:
         while time > self.time:
             step = min(time, self.time + stride)
             self._vehicle.predict(self._acting, self.time, step)
+            self._charge("motion")
             for companion in self.companions:
                 companion.moved(self.time, step)
+            self._charge(WITNESSES)
             self.time = step
-        self._charge("motion")
 
     def _thinned(self, passed: Passed, course: Course) -> Passed:
         """Take as many measurements as the course has room for, and refuse the rest."""
@@ -207,12 +210,13 @@ class Fusion:
         if measured is None:
             return
         record = self._intake.records.of(measured.name)
-        if not self._believed(time, waiting, measured):
+        believed = self._believed(time, waiting, measured)
+        self._charge(WITNESSES)
+        if not believed:
             record.refused["distrusted"] += 1
             return
         self._vehicle.level(self._acting, waiting.sample.reading, self._intake.frame, measured.repeats)
         self._take_evidence(time, measured, record)
-        self._charge("sensing")
 
     def _measured(self, time: int, waiting: Waiting) -> Measurement | None:
         """Return what was read in its model's terms; ``None``, and the reason counted, where that cannot be."""
@@ -247,9 +251,11 @@ class Fusion:
         if not evidence.accepted:
             record.refused["invalid"] += 1
             return
+        self._charge("sensing")
         surprise = measured.surprise(evidence.log_mean)
         for companion in self.companions:
             companion.weighed(time, measured, evidence, surprise > OUTLIER)
+        self._charge(WITNESSES)
         record.innovation = evidence.innovation
         record.last = time
         record.judge(surprise > OUTLIER)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from service.estimator import Cause, Level
-from service.governor import COLD, GROWTH, SETTLE, WINDOW, Decision, Governor, Shape
+from service.governor import COLD, COLD_MEASUREMENTS, GROWTH, SETTLE, Decision, Governor, Shape
+from service.tick_costs import WINDOW
 
 BUDGET = 4e-3
 SMALLEST, LARGEST = 200, 1_000_000
@@ -28,6 +29,7 @@ class Machine:
         self.noise = noise
         self.slower = 1.0
         self.resampling_every = 1
+        self.measuring_every = 1
 
     def run(self, governor: Governor, ticks: int, demand: int = LARGEST) -> tuple[np.ndarray, np.ndarray]:
         """Return count and total cost of every tick."""
@@ -39,16 +41,14 @@ class Machine:
         return counts, costs
 
     def _tick(self, governor: Governor, count: int, tick: int) -> float:
-        fixed = self.slower * FIXED * self._jitter()
-        governor.observe("ingest", fixed, 0)
-        total = fixed
+        costs = {"ingest": self.slower * FIXED * self._jitter()}
         for stage, slope in STAGES.items():
             if stage == "resampling" and tick % self.resampling_every:
                 continue
-            seconds = self.slower * (OVERHEAD + slope * count) * self._jitter()
-            governor.observe(stage, seconds, count)
-            total += seconds
-        return total
+            costs[stage] = self.slower * (OVERHEAD + slope * count) * self._jitter()
+        measurements = 0 if tick % self.measuring_every else 1
+        governor.observe(costs, count, measurements, measurements)
+        return sum(costs.values())
 
     def _jitter(self) -> float:
         return float(self.random.lognormal(0.0, self.noise))
@@ -56,6 +56,11 @@ class Machine:
 
 def fresh() -> Governor:
     return Governor(BUDGET, SMALLEST, LARGEST, SHAPES)
+
+
+def observe(governor: Governor, costs: dict[str, float], count: int = SMALLEST) -> None:
+    """Tell of a tick with one measurement, which was weighed."""
+    governor.observe(costs, count, 1, 1)
 
 
 def test_converges_to_what_the_budget_affords() -> None:
@@ -67,24 +72,21 @@ def test_converges_to_what_the_budget_affords() -> None:
 
 @pytest.mark.parametrize("noise", [0.05, 0.1, 0.2])
 def test_seldom_exceeds_the_budget(noise: float) -> None:
-    """At most 2 % of 5,000 ticks, for independent log-normal noise of 5, 10 and 20 % on every stage.
-
-    The sum of the stages' 95 % quantiles lies beyond the 99 % quantile of their sum here. Seeded.
-    """
+    """At most 2 % of 5,000 ticks, for independent log-normal noise of 5, 10 and 20 % on every stage. Seeded."""
     counts, costs = Machine(noise).run(fresh(), 5_000)
     assert np.mean(costs > BUDGET) <= 0.02
     assert counts[1_000:].mean() >= 0.6 * AFFORDABLE
 
 
 def test_reacts_to_doubled_cost_within_eight_ticks() -> None:
-    """The 95 % quantile of 64 values moves with the fourth slow one; then the count drops at once."""
+    """The 98 % quantile of 100 values moves with the third slow one; then the count drops at once."""
     machine, governor = Machine(noise=0.02), fresh()
     machine.run(governor, 1_000)
     machine.slower = 2.0
     _, costs = machine.run(governor, 200)
     assert costs[0] > 1.5 * BUDGET
     assert costs[8:].max() < 1.1 * BUDGET
-    assert np.mean(costs[8:] > BUDGET) <= 0.05
+    assert np.mean(costs[8:] > BUDGET) <= 0.1, "at first it is the quantile of few"
 
 
 def test_recovers_when_the_machine_is_fast_again() -> None:
@@ -119,10 +121,36 @@ def test_grows_slowly_and_shrinks_at_once() -> None:
     grown = counts[1:] / counts[:-1]
     assert GROWTH == 1.1
     assert 1.05 < grown.max() <= 1.1001, "counts are whole, and the first guess is low"
-    governor.observe("sensing", 100.0, int(counts[-1]))
     for _ in range(3):
-        governor.observe("sensing", 100.0, int(counts[-1]))
+        observe(governor, {"sensing": 100.0}, int(counts[-1]))
     assert governor.decide(LARGEST).count == SMALLEST
+
+
+def test_stages_that_peak_apart_are_not_paid_for_together() -> None:
+    """Three stages, of which one costs 2 ms in each tick and the others next to nothing: all fits into 4 ms.
+
+    The sum of the stages' own high quantiles would be 6 ms, and starve it. Closed form.
+    """
+    governor = fresh()
+    for tick in range(2 * WINDOW):
+        dear = ("ingest", "witnesses", "publishing")[tick % 3]
+        observe(
+            governor, {"ingest": 1e-5, "witnesses": 1e-5, "publishing": 1e-5, "sensing": 1e-4} | {dear: 2e-3}
+        )
+    decision = governor.decide(5_000)
+    assert (decision.count, decision.level) == (5_000, Level.FULL)
+
+
+def test_the_first_measurement_is_not_the_price_of_each() -> None:
+    """What 4 measurements share costs 2 ms, and each of them 0.1: once thinned to one, it is not so for ever."""
+    governor = fresh()
+    for _ in range(WINDOW):
+        observe(governor, {"sensing": 5e-3})
+    assert governor.decide(SMALLEST).level >= Level.THINNED
+    for _ in range(6 * WINDOW):
+        weighed = min(governor.decide(SMALLEST).most, 4)
+        governor.observe({"sensing": 2e-3 + weighed * 1e-4} if weighed else {}, SMALLEST, 4, weighed)
+    assert governor.decide(SMALLEST).level is Level.FULL
 
 
 def test_demand_within_the_supply_is_met_in_full() -> None:
@@ -145,14 +173,14 @@ def test_demand_beyond_the_supply_lowers_the_level() -> None:
 def test_starved_says_less_than_the_minimum_but_uses_it() -> None:
     governor = fresh()
     for _ in range(WINDOW):
-        governor.observe("motion", 1.0, SMALLEST)
+        observe(governor, {"motion": 1.0})
     assert governor.decide(5_000) == Decision(SMALLEST, 0, Level.PREDICTION_ONLY, Cause.BUDGET, 0)
 
 
 def test_fixed_cost_alone_can_eat_the_budget() -> None:
     governor = fresh()
     for _ in range(WINDOW):
-        governor.observe("ingest", 2 * BUDGET, 0)
+        observe(governor, {"ingest": 2 * BUDGET})
     assert governor.decide(5_000).afforded == 0
 
 
@@ -163,8 +191,10 @@ def test_never_more_than_the_capacity() -> None:
 
 
 def test_starts_from_what_the_rehearsal_measured() -> None:
-    """Closed form, before any tick: the rehearsal's line, twice as dear."""
-    expected = (BUDGET - COLD * len(STAGES) * OVERHEAD) / (COLD * PER_PARTICLE)
+    """Closed form, before any tick: the rehearsal's lines, twice as dear, and two measurements."""
+    times = {stage: 1 if stage == "extraction" else COLD_MEASUREMENTS for stage in STAGES}
+    overhead = COLD * sum(times.values()) * OVERHEAD
+    expected = (BUDGET - overhead) / (COLD * sum(times[stage] * slope for stage, slope in STAGES.items()))
     assert fresh().decide(LARGEST).count == int(expected)
 
 
@@ -172,8 +202,7 @@ def test_one_early_exception_does_not_rule() -> None:
     """A first tick of 3 ms at 200 particles says nothing of 100,000."""
     governor = fresh()
     before = governor.decide(LARGEST)
-    governor.observe("motion", 3e-3, SMALLEST)
-    governor.observe("ingest", 3e-3, 0)
+    observe(governor, {"motion": 3e-3, "ingest": 3e-3})
     assert governor.decide(LARGEST) == before
 
 
@@ -217,16 +246,13 @@ class Vehicle:
 
     def tick(self, governor: Governor) -> tuple[Decision, float]:
         decision = governor.decide(5_000)
-        governor.observe("ingest", self.fixed, 0)
-        total = self.fixed
-        if decision.level < Level.NO_CLOUD:
-            governor.observe("cloud", self.cloud, 0)
-            total += self.cloud
         weighed = min(decision.most, self.offered)
-        if weighed:
-            governor.observe("sensing", self.each * self.offered, decision.count)
-            governor.observe_measurement(self.each, decision.count)
-        return decision, total + weighed * self.each
+        costs = {"ingest": self.fixed, "sensing": weighed * self.each}
+        if decision.level < Level.NO_CLOUD:
+            costs["cloud"] = self.cloud
+        count = 0 if decision.level is Level.KALMAN else decision.count
+        governor.observe(costs, count, self.offered, weighed)
+        return decision, sum(costs.values())
 
     def run(self, governor: Governor, ticks: int) -> list[tuple[Decision, float]]:
         return [self.tick(governor) for _ in range(ticks)]
@@ -255,8 +281,7 @@ def test_gives_up_in_the_declared_order(
     assert decision.cause is (Cause.BUDGET if level else Cause.NONE)
     assert max(cost for _, cost in run[30:70]) <= BUDGET + 1e-9
     if level >= Level.THINNED:
-        assert decision.count == SMALLEST
-        assert decision.afforded < SMALLEST
+        assert decision.count == SMALLEST >= decision.afforded
 
 
 def test_what_is_not_measured_any_more_is_tried_again() -> None:
@@ -302,9 +327,9 @@ def test_a_kalman_filter_hands_back_when_particles_have_become_cheap() -> None:
         levels.append(decision.level)
         if decision.level is Level.KALMAN:
             governor.observe_deputy(2.0 * cost.at(20), 20)
-        else:
-            governor.observe("sensing", 20 * 0.01e-3, decision.count)
-            governor.observe_measurement(0.01e-3, decision.count)
+        weighed = 0 if decision.level is Level.KALMAN else min(20, decision.most)
+        count = decision.count if weighed else 0
+        governor.observe({"sensing": weighed * 0.01e-3}, count, 20, weighed)
     assert levels[0] is Level.KALMAN
     assert levels[-1] <= Level.FEWER_PARTICLES
     assert sum(a != b for a, b in pairwise(levels)) <= 4  # it does not hunt
@@ -352,23 +377,22 @@ def test_others_on_the_processor_cost_particles() -> None:
             governor.observe_wait(wait)
         assert governor.room == pytest.approx(room)
         decision = governor.decide(LARGEST)
-        assert decision.count == pytest.approx(room / (COLD * 1e-7), abs=1)
+        assert decision.count == pytest.approx(room / (COLD * COLD_MEASUREMENTS * 1e-7), abs=1)
         assert decision.cause is (Cause.BUDGET if room == BUDGET else Cause.PROCESSOR)
 
 
 def test_others_alone_never_starve_it() -> None:
-    governor = Governor(BUDGET, 15_000, LARGEST, {"sensing": Shape(0.0, 1e-7)}, 10e-3)
+    governor = Governor(BUDGET, 7_500, LARGEST, {"sensing": Shape(0.0, 1e-7)}, 10e-3)
     for _ in range(WINDOW):
         governor.observe_wait(1.0)
     decision = governor.decide(LARGEST)
-    assert decision.count == decision.afforded == 15_000
+    assert decision.count == decision.afforded == 7_500
     assert decision.level is Level.FEWER_PARTICLES
 
 
 def test_the_reserve_is_what_comes_after_the_weighing() -> None:
     governor = fresh()
-    for stage, seconds in (("ingest", 1e-3), ("publishing", 2e-4), ("cloud", 1e-4)):
-        for _ in range(WINDOW):
-            governor.observe(stage, seconds, 0)
+    for _ in range(WINDOW):
+        observe(governor, {"ingest": 1e-3, "publishing": 2e-4, "cloud": 1e-4})
     later = sum(SHAPES[stage].at(1_000) for stage in ("resampling", "extraction"))
     assert governor.reserve(1_000) == pytest.approx(COLD * later + 3e-4)

@@ -42,7 +42,8 @@ def test_every_stage_is_run_and_has_a_shape(tmp_path: Path, most: int) -> None:
     path = tmp_path / "rover.toml"
     path.write_text(TOML.format(most=most))
     shapes = rehearse(load(path))
-    assert set(shapes) == {*PARTICLE_STAGES, "kalman"}
+    assert set(shapes) == {*PARTICLE_STAGES, "witnesses", "kalman"}
+    assert shapes.pop("witnesses").per_particle == 0.0, "no particle makes them dearer"
     assert all(shape.per_particle > 0.0 and shape.overhead >= 0.0 for shape in shapes.values())
 
 
