@@ -227,8 +227,8 @@ class Budget(msgspec.Struct, frozen=True, gc=False):
     budget_ms, rate : float
         What the configuration grants per tick, and ticks per second.
     stages : dict[str, StageCost]
-        ``ingest``, ``motion``, ``sensing``, ``resampling``, ``search``, ``extraction``, ``publishing``, ``cloud`` and
-        ``tick`` (all of it).
+        ``ingest``, ``motion``, ``sensing``, ``witnesses`` (trust, motion mode, hypotheses), ``resampling``, ``kalman``,
+        ``search``, ``extraction``, ``publishing``, ``cloud``, ``other`` and ``tick`` (all of it).
     use : float
         Share of the budget used, median over the ticks.
     demanded, afforded, particles, level : int
