@@ -12,12 +12,15 @@ import csv
 import struct
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from service.channels import Outlet
-from service.estimator import Cause, Course, Level
 from service.records import DECIDED
+
+if TYPE_CHECKING:
+    from service.estimator import Course
 
 COLUMNS = ("tick", "now_ns", "unix_ns", "afforded", "level", "cause", "most", "cut_after", "rested")
 UNCUT = -1
@@ -60,7 +63,15 @@ class Decided(msgspec.Struct, frozen=True):
     taken: tuple[int, ...]
 
     def course(self) -> Course:
-        """Return the course that the tick took, for the estimator to take again."""
+        """Return the course that the tick took, for the estimator to take again.
+
+        Raises
+        ------
+        ValueError
+            There is no such level or cause.
+        """
+        from service.estimator import Cause, Course, Level  # the recording process has no use for its kernels
+
         again = Course(Level(self.level), Cause(self.cause), self.most)
         again.rested = self.rested
         if self.cut_after != UNCUT:
@@ -189,9 +200,9 @@ def _parsed(place: str, row: list[str], expected: int) -> Decided:
         figures = [int(cell) for cell in row]
         tick, now, unix, afforded, level, cause, most, cut_after, rested = figures[: len(COLUMNS)]
         decision = Decided(
-            tick, now, unix, afforded, Level(level), Cause(cause), most, cut_after, rested,
-            tuple(figures[len(COLUMNS) :]),
-        )  # fmt: skip
+            tick, now, unix, afforded, level, cause, most, cut_after, rested, tuple(figures[len(COLUMNS) :])
+        )
+        decision.course()
     except ValueError as error:
         raise DecisionLogError(f"{place}: {error}") from error
     if tick != expected:
