@@ -94,7 +94,7 @@ def test_the_distance_is_the_integral_of_the_root_of_both_densities() -> None:
     """Bhattacharyya: -log ∫ √(p q); here over north and east as sums over a fine grid, the headings being alike."""
     one, two = gaussian(0.0, 0.0, 0.3, (1.0, 0.5, 0.01)), gaussian(1.5, -0.7, 0.3, (0.6, 2.0, 0.01))
     axis = np.arange(-14.0, 14.0, 0.05)
-    root = [
+    root: list[Array] = [
         np.sqrt(
             norm.pdf(axis, one.mean[i], np.sqrt(one.variance[i]))
             * norm.pdf(axis, two.mean[i], np.sqrt(two.variance[i]))
