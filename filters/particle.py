@@ -26,7 +26,7 @@ from filters.kernels.compile import Float32Array, Int32Array
 from filters.kernels.covariance import covariance
 from filters.kernels.regularization import shrink
 from filters.motion.learned import Learned, SlowState
-from filters.motion.model import Motion
+from filters.motion.model import Motion, Reopening
 from filters.motion.slow import RandomWalk, diffuse
 from filters.motion.walks import Walk, Walks
 from filters.particle_checks import check_injected, check_shape, check_slow, check_start
@@ -34,6 +34,7 @@ from filters.particle_moments import MomentSums
 from filters.particle_set import ParticleSet
 from filters.regularization import Rule, root, weighted_covariance
 from filters.rejuvenation import power, spread
+from filters.reopening import reopen
 from filters.resampling import Resampler, systematic
 from filters.sensing.model import Learner, Sensor
 
@@ -108,6 +109,7 @@ class ParticleFilter(Generic[Control]):
         self.tempered = 0
         """How often the weights were raised to a power below one."""
         self._motion = motion
+        self._reopening = motion if isinstance(motion, Reopening) else None
         self._seed = seed
         self._step = 0
         self._draws = 0
@@ -595,6 +597,28 @@ class ParticleFilter(Generic[Control]):
                     random.normal_pairs(first, last, step, key, self._noises[0], 0)
                 for row, sigma in zip(rows, spread[:, axis], strict=True):
                     diffuse(self._particles.columns, row, first, last, self._noises[0], axis % 2, sigma)
+
+    def reopen(self, effective_sample_size: float) -> None:
+        """Open the motion's slow states again after a resampling, so that few ancestors' means do not freeze them.
+
+        Mean, covariance with the pose and variance of each stay what they were; see :mod:`filters.reopening`.
+
+        Parameters
+        ----------
+        effective_sample_size : float
+            Before that resampling.
+        """
+        motion = self._reopening
+        if motion is None:
+            return
+        names = list(motion.conditional_variances)
+        rows = [self._particles.row(name) for name in names]
+        columns, count = self._particles.columns, self.count
+        opened = reopen(columns[:3, :count], columns[rows, :count], effective_sample_size)
+        if opened is not None:
+            taken, variances = opened
+            columns[rows, :count] -= taken
+            motion.reopen(dict(zip(names, variances.tolist(), strict=True)))
 
     def temper(self, share: float) -> float:
         """Raise the weights to the largest power at most 1 that leaves a share of the particles effective.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 from filters.kernels.compile import Float32Array
 from filters.motion.slow import RandomWalk
@@ -76,4 +76,18 @@ class Motion(Protocol[Control, Step]):
         step : Step
             Of :meth:`begin`.
         """
+        ...
+
+
+@runtime_checkable
+class Reopening(Protocol):
+    """What a motion model offers beside that if the states that it marginalises are slow: they can be opened again."""
+
+    @property
+    def conditional_variances(self) -> Mapping[str, float]:
+        """As of :class:`Motion`."""
+        ...
+
+    def reopen(self, variances: Mapping[str, float]) -> None:
+        """Add to the variance of every marginalised column what was taken off its means (:mod:`filters.reopening`)."""
         ...

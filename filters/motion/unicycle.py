@@ -10,6 +10,7 @@ states freeze: resampling leaves a few ancestors' values, and their spread says 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from numpy import float32
@@ -144,6 +145,11 @@ class Unicycle:
     def conditional_variances(self) -> dict[str, float]:
         """Variances of bias and scale given a particle's path; the spread of the particles' means comes on top."""
         return {GYRO_BIAS: self._bias_variance, ODOMETRY_SCALE: self._scale_variance}
+
+    def reopen(self, variances: Mapping[str, float]) -> None:
+        """Add to what the paths leave open of bias and scale; see :class:`filters.motion.model.Reopening`."""
+        self._bias_variance += variances[GYRO_BIAS]
+        self._scale_variance += variances[ODOMETRY_SCALE]
 
     def noise_variances(self, control: UnicycleControl, duration: float) -> tuple[float, float]:
         """Return the variances of the distance (m²) and of the turn (rad²) that a control leaves open: R and Q."""

@@ -97,12 +97,17 @@ class Population:
         self._stopwatch.lap("resampling")
 
     def resample(self, afforded: int) -> None:
-        """Draw as many particles as are demanded and afforded."""
+        """Draw as many particles as are demanded and afforded.
+
+        Where there is one place only, what is marginalised is opened again (:mod:`filters.reopening`).
+        """
         count = self.clamp(self.demand, afforded)
         if self.tracker is not None and self.tracker.divided:
             self.tracker.draw(count)
         else:
+            worth = self._belief.effective_sample_size
             self._belief.resample(count)
+            self._belief.reopen(worth)
 
     def fit(self, afforded: int) -> None:
         """Shrink at once when the budget shrank; grow between resamplings only when the demand grew clearly."""
