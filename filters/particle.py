@@ -395,6 +395,17 @@ class ParticleFilter(Generic[Control]):
             self._total * self._total / self._squares,
         )
 
+    def glance(self) -> Moments:
+        """Moments as :meth:`moments` finds them, for whoever only looks on: the centre stays where it was.
+
+        So the belief goes on to the very bytes to which it would have gone on unobserved.
+        """
+        centre, values = self._centre.columns.copy(), self._centre_values.copy()
+        found = self.moments()
+        self._centre.columns[:] = centre
+        self._centre_values.update(values)
+        return found
+
     def joint(self, names: Sequence[str]) -> Joint:
         """Weighted mean and covariance of some columns together; a heading among them is taken as a mere number.
 
