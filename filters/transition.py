@@ -113,6 +113,73 @@ class SparseTransition:
         return cast(Vector, moved)
 
 
+class Drift:
+    """The transition of a chain in continuous time over a short duration: exp(Q t) to first order, 1 + Q t.
+
+    Parameters
+    ----------
+    rates : (n, n) array
+        ``rates[i, k]`` is how often per second state i turns into k; each row sums to zero.
+    duration : float
+        Seconds, in which no state is left with more than certainty.
+
+    Raises
+    ------
+    ValueError
+        A matrix that is not square or whose rows do not sum to zero, or a duration that is negative or too long.
+    """
+
+    def __init__(self, rates: Matrix, duration: float) -> None:
+        if rates.ndim != 2 or rates.shape[0] != rates.shape[1] or rates.size == 0:
+            raise ValueError(f"drift: a square matrix is needed, got shape {rates.shape}")
+        leaving = [-rates.item(state, state) for state in range(len(rates))]
+        if not (duration >= 0.0 and max(leaving) * duration <= 1.0):
+            raise ValueError(f"drift: no state may be left more than once, got {duration} s")
+        self._rates = rates
+        self._duration = duration
+
+    @property
+    def size(self) -> int:
+        """How many states there are."""
+        return len(self._rates)
+
+    def predict(self, belief: Vector) -> Vector:
+        """Line 3 of Table 4.1: p + p Q t."""
+        return belief + self._duration * (belief @ self._rates)
+
+
+class Forgetting:
+    """The transition after which a share of the belief is spread evenly: what was learned is forgotten by so much.
+
+    Parameters
+    ----------
+    size : int
+        How many states.
+    share : float
+        In [0, 1].
+
+    Raises
+    ------
+    ValueError
+        No state, or a share outside [0, 1].
+    """
+
+    def __init__(self, size: int, share: float) -> None:
+        if size < 1 or not 0.0 <= share <= 1.0:
+            raise ValueError(f"forgetting: a state and a share in [0, 1] are needed, got {size} and {share}")
+        self._size = size
+        self._share = share
+
+    @property
+    def size(self) -> int:
+        """How many states there are."""
+        return self._size
+
+    def predict(self, belief: Vector) -> Vector:
+        """Line 3 of Table 4.1: the same share of each state goes to all of them."""
+        return (1.0 - self._share) * belief + self._share / self._size * belief.sum()
+
+
 def transition(given: object) -> Transition:
     """Make a transition of a matrix, or of a sparse matrix: anything with ``tocoo``, as scipy's have.
 

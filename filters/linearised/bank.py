@@ -19,6 +19,14 @@ from numpy.typing import ArrayLike, NDArray
 from filters import chi_square
 from filters.kalman import Matrix, checked_gaussian
 from filters.kernels.bank import correct, move
+from filters.kernels.expectations import (
+    expect_heading,
+    expect_position,
+    expect_range,
+    expect_velocity,
+    expect_wheel_speed,
+    spread_of,
+)
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.sensing import (
@@ -38,7 +46,7 @@ Flags = NDArray[np.bool_]
 
 
 class Expectations(NamedTuple):
-    """What was measured, beside what every member leads to expect; m is 1 or 2.
+    """What was measured, beside what every live member leads to expect, and zeros for the others; m is 1 or 2.
 
     Attributes
     ----------
@@ -112,7 +120,9 @@ class GaussianBank:
         self.mean: Matrix = np.zeros((members, size))
         self.covariance: Matrix = np.zeros((members, size, size))
         self.live: Flags = np.zeros(members, np.bool_)
-        self._ones: Matrix = np.ones(members)
+        self._along: Matrix = np.zeros(members)
+        self._about: Matrix = np.zeros(members)
+        self._walked: Matrix = np.zeros(size)
 
     def set(self, member: int, mean: ArrayLike, covariance: ArrayLike) -> None:
         """Have a member hold this Gaussian from now on.
@@ -156,32 +166,47 @@ class GaussianBank:
         if not (0.0 <= duration < math.inf and all(map(math.isfinite, control))):
             raise ValueError(f"bank: control and duration must be finite, got {control} over {duration} s")
         along, about = self._motion.noise_variances(control, duration)
-        move(
+        np.add(along, distance_variance, out=self._along)
+        np.add(about, turn_variance, out=self._about)
+        np.multiply(self._walk_variances, duration, out=self._walked)
+        move.direct(
             self.mean,
             self.covariance,
             self.live,
             control.distance,
             control.turn,
             duration,
-            self._ones * along + distance_variance,
-            self._ones * about + turn_variance,
-            self._walk_variances * duration,
+            self._along,
+            self._about,
+            self._walked,
         )
 
     def expect(self, sensor: Any, measurement: Any) -> Expectations:
-        """Linearise a measurement of one of :data:`BATCHED`'s sensors at every member's mean.
+        """Linearise a measurement of one of :data:`BATCHED`'s sensors at every live member's mean.
 
         Raises
         ------
         TypeError
             A sensor model that is not among them.
+        ValueError
+            Residuals that are not finite.
         """
         kind: type = cast(Any, type)(sensor)
         make = BATCHED.get(kind)
         if make is None:
             known = ", ".join(kind.__name__ for kind in BATCHED)
             raise TypeError(f"bank: {kind.__name__} is not among {known}")
-        return make(sensor, self.rows, self.mean, measurement)
+        said = make(sensor, self.rows, self.mean, self.live, measurement)
+        if said is None:
+            raise ValueError(f"bank: residuals must be finite, got a measurement of {measurement}")
+        return said
+
+    def spread(self, expectations: Expectations, member: int) -> Matrix:
+        """Return the covariance of what a member expects, (m, m): H C Hᵀ."""
+        components = expectations.residual.shape[1]
+        spread = np.empty((components, components))
+        spread_of.direct(self.covariance, expectations.jacobian, member, spread)
+        return spread
 
     def correct(self, expectations: Expectations, chosen: Flags, gate: float | None = None) -> Corrections:
         """Weigh a measurement into the chosen members, each by its own expectation of it.
@@ -195,110 +220,87 @@ class GaussianBank:
         gate : float, optional
             Probability with which a measurement that the model is right about passes; a gate of 0 keeps everything
             out, so that the evidence is all that comes of it.
-
-        Raises
-        ------
-        ValueError
-            Residuals that are not finite; nothing has changed then.
         """
         members, measured = expectations.residual.shape
-        if not np.isfinite(expectations.residual[self.live]).all():
-            raise ValueError(f"bank: residuals must be finite, got {expectations.residual.tolist()}")
         limit = math.inf if gate is None else (chi_square.quantile(gate, measured) if gate > 0.0 else -1.0)
         said = Corrections(np.empty(members), np.empty(members), np.empty(members, np.bool_))
-        correct(self.mean, self.covariance, chosen & self.live, *expectations, limit, *said)
+        correct.direct(self.mean, self.covariance, chosen & self.live, *expectations, limit, *said)
         return said
 
 
-def _expect_position(
-    sensor: Position, rows: Rows, mean: Matrix, measurement: PositionMeasurement
-) -> Expectations:
-    north, east, heading = rows["north"], rows["east"], rows["heading"]
-    forward, right = sensor.lever
-    sine, cosine = np.sin(mean[:, heading]), np.cos(mean[:, heading])
-    ahead, aside = forward * cosine - right * sine, forward * sine + right * cosine
-    jacobian = np.zeros((len(mean), 2, mean.shape[1]))
-    jacobian[:, 0, north] = jacobian[:, 1, east] = 1.0
-    jacobian[:, 0, heading], jacobian[:, 1, heading] = -aside, ahead
-    residual = np.stack(
-        (measurement.north - mean[:, north] - ahead, measurement.east - mean[:, east] - aside), axis=1
+def _room(mean: Matrix, components: int) -> Expectations:
+    """Return expectations of nothing, for a kernel to write the live members' into."""
+    members, size = mean.shape
+    return Expectations(
+        np.zeros((members, components)),
+        np.zeros((members, components, size)),
+        np.zeros((members, components)),
     )
+
+
+def _row(rows: Rows, name: str | None) -> int:
+    return -1 if name is None else rows[name]
+
+
+def _expect_position(
+    sensor: Position, rows: Rows, mean: Matrix, live: Flags, measurement: PositionMeasurement
+) -> Expectations | None:
     sigma_north = sensor.sigma if measurement.sigma_north is None else measurement.sigma_north
     sigma_east = sigma_north if measurement.sigma_east is None else measurement.sigma_east
-    noise = np.empty_like(residual)
-    noise[:] = sigma_north**2, sigma_east**2
-    return Expectations(residual, jacobian, noise)
+    said = _room(mean, 2)
+    finite = expect_position.direct(
+        mean, live, measurement.north, measurement.east, *sensor.lever, sigma_north, sigma_east, *said
+    )
+    return said if finite else None
 
 
 def _expect_velocity(
-    sensor: Velocity, rows: Rows, mean: Matrix, measurement: VelocityMeasurement
-) -> Expectations:
-    heading, scale = rows["heading"], sensor.scale
-    speed = measurement.speed * (np.ones(len(mean)) if scale is None else mean[:, rows[scale]])
-    sine, cosine = np.sin(mean[:, heading]), np.cos(mean[:, heading])
-    jacobian = np.zeros((len(mean), 2, mean.shape[1]))
-    jacobian[:, 0, heading], jacobian[:, 1, heading] = -speed * sine, speed * cosine
-    if scale is not None:
-        jacobian[:, 0, rows[scale]] = measurement.speed * cosine
-        jacobian[:, 1, rows[scale]] = measurement.speed * sine
-    residual = np.stack((measurement.north - speed * cosine, measurement.east - speed * sine), axis=1)
+    sensor: Velocity, rows: Rows, mean: Matrix, live: Flags, measurement: VelocityMeasurement
+) -> Expectations | None:
     sigma = sensor.sigma if measurement.sigma is None else measurement.sigma
-    return Expectations(residual, jacobian, np.full_like(residual, sigma**2))
+    scale = _row(rows, sensor.scale)
+    said = _room(mean, 2)
+    finite = expect_velocity.direct(
+        mean, live, measurement.north, measurement.east, measurement.speed, scale, sigma, *said
+    )
+    return said if finite else None
 
 
-def _expect_range(sensor: Range, rows: Rows, mean: Matrix, measurement: RangeMeasurement) -> Expectations:
-    north = mean[:, rows["north"]] - measurement.north
-    east = mean[:, rows["east"]] - measurement.east
-    distance = np.sqrt(north * north + east * east + measurement.down_difference**2)
-    scale = np.ones(len(mean)) if sensor.scale is None else mean[:, rows[sensor.scale]]
-    bias = 0.0 if sensor.bias is None else mean[:, rows[sensor.bias]]
-    jacobian = np.zeros((len(mean), 1, mean.shape[1]))
-    per_metre = np.divide(scale, distance, out=np.zeros(len(mean)), where=distance > 0.0)
-    jacobian[:, 0, rows["north"]] = per_metre * north
-    jacobian[:, 0, rows["east"]] = per_metre * east
-    if sensor.scale is not None:
-        jacobian[:, 0, rows[sensor.scale]] = distance
-    if sensor.bias is not None:
-        jacobian[:, 0, rows[sensor.bias]] = 1.0
-    residual = (measurement.distance - scale * distance - bias)[:, None]
+def _expect_range(
+    sensor: Range, rows: Rows, mean: Matrix, live: Flags, measurement: RangeMeasurement
+) -> Expectations | None:
     sigma = sensor.sigma if measurement.sigma is None else measurement.sigma
-    return Expectations(np.ascontiguousarray(residual), jacobian, np.full_like(residual, sigma**2))
+    scale, bias = _row(rows, sensor.scale), _row(rows, sensor.bias)
+    distance, north, east, down = measurement[:4]
+    said = _room(mean, 1)
+    finite = expect_range.direct(mean, live, distance, north, east, down, scale, bias, sigma, *said)
+    return said if finite else None
 
 
 def _expect_heading(
-    sensor: Heading, rows: Rows, mean: Matrix, measurement: HeadingMeasurement
-) -> Expectations:
-    jacobian = np.zeros((len(mean), 1, mean.shape[1]))
-    jacobian[:, 0, rows["heading"]] = 1.0
-    expected = mean[:, rows["heading"]].copy()
-    if sensor.bias is not None:
-        jacobian[:, 0, rows[sensor.bias]] = 1.0
-        expected += mean[:, rows[sensor.bias]]
-    residual = np.remainder(measurement.heading - expected + math.pi, 2.0 * math.pi)[:, None] - math.pi
+    sensor: Heading, rows: Rows, mean: Matrix, live: Flags, measurement: HeadingMeasurement
+) -> Expectations | None:
     sigma = sensor.sigma if measurement.sigma is None else measurement.sigma
-    return Expectations(residual, jacobian, np.full_like(residual, sigma**2))
+    said = _room(mean, 1)
+    finite = expect_heading.direct(mean, live, measurement.heading, _row(rows, sensor.bias), sigma, *said)
+    return said if finite else None
 
 
 def _expect_wheel_speed(
-    sensor: WheelSpeed, rows: Rows, mean: Matrix, measurement: WheelSpeedMeasurement
-) -> Expectations:
-    odometry, gyro = rows[ODOMETRY_SCALE], rows[GYRO_BIAS]
-    turning = measurement.yaw_rate - mean[:, gyro]
-    speed = mean[:, odometry] * measurement.rolled - measurement.right * turning
-    scale = np.ones(len(mean)) if sensor.scale is None else mean[:, rows[sensor.scale]]
-    bias = 0.0 if sensor.bias is None else mean[:, rows[sensor.bias]]
-    jacobian = np.zeros((len(mean), 1, mean.shape[1]))
-    jacobian[:, 0, odometry] = scale * measurement.rolled
-    jacobian[:, 0, gyro] = scale * measurement.right
-    if sensor.scale is not None:
-        jacobian[:, 0, rows[sensor.scale]] = speed
-    if sensor.bias is not None:
-        jacobian[:, 0, rows[sensor.bias]] = 1.0
-    residual = (measurement.speed - scale * speed - bias)[:, None]
-    return Expectations(residual, jacobian, np.full_like(residual, sensor.spread(measurement) ** 2))
+    sensor: WheelSpeed, rows: Rows, mean: Matrix, live: Flags, measurement: WheelSpeedMeasurement
+) -> Expectations | None:
+    speed, rolled, yaw_rate, right, _ = measurement
+    gyro, odometry = rows[GYRO_BIAS], rows[ODOMETRY_SCALE]
+    scale, bias = _row(rows, sensor.scale), _row(rows, sensor.bias)
+    sigma = sensor.spread(measurement)
+    said = _room(mean, 1)
+    finite = expect_wheel_speed.direct(
+        mean, live, speed, rolled, yaw_rate, right, gyro, odometry, scale, bias, sigma, *said
+    )
+    return said if finite else None
 
 
-BATCHED: Mapping[type, Callable[[Any, Rows, Matrix, Any], Expectations]] = MappingProxyType(
+BATCHED: Mapping[type, Callable[[Any, Rows, Matrix, Flags, Any], Expectations | None]] = MappingProxyType(
     {
         Heading: _expect_heading,
         Position: _expect_position,
@@ -307,4 +309,4 @@ BATCHED: Mapping[type, Callable[[Any, Rows, Matrix, Any], Expectations]] = Mappi
         WheelSpeed: _expect_wheel_speed,
     }
 )
-"""How each sensor model of the particle filter is expected by all members at once."""
+"""How each sensor model of the particle filter is expected by all live members at once; ``None``: not finite."""

@@ -13,11 +13,10 @@ The belief mu itself is a discrete Bayes filter (Table 4.1), which is kept outsi
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from filters.kalman import Matrix
+from filters.kernels.mixing import mix_gaussians
 from filters.linearised.bank import GaussianBank
 
 _HEADING = 2
@@ -46,15 +45,10 @@ def mix(bank: GaussianBank, transition: Matrix, belief: Matrix) -> None:
             f"mix: a transition of {members} models and a belief over them are needed, got {transition.shape} and "
             f"{belief.tolist()}"
         )
-    joint = transition * belief[:, None]
-    total = joint.sum(axis=0)
-    weights = np.where(total > 0.0, joint / np.where(total > 0.0, total, 1.0), np.eye(members))
-    reference = bank.mean[0].copy()
-    away = bank.mean - reference
-    away[:, _HEADING] = np.remainder(away[:, _HEADING] + math.pi, 2.0 * math.pi) - math.pi
-    mixed = weights.T @ away
-    apart = away[None, :, :] - mixed[:, None, :]
-    spread = np.einsum("ij,jik,jil->jkl", weights, apart, apart)
-    bank.covariance[:] = np.tensordot(weights.T, bank.covariance, axes=1) + spread
-    bank.mean[:] = reference + mixed
-    bank.mean[:, _HEADING] = np.remainder(bank.mean[:, _HEADING] + math.pi, 2.0 * math.pi) - math.pi
+    mix_gaussians.direct(
+        bank.mean,
+        bank.covariance,
+        np.ascontiguousarray(transition, np.float64),
+        np.ascontiguousarray(belief, np.float64),
+        _HEADING,
+    )

@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections import deque
 
 from filters.binary import BinaryBayesFilter
-from filters.kalman import Matrix
 from service.estimator.track import SECOND
 from service.estimator.witnesses import Testimony
 
@@ -35,7 +34,7 @@ class Lie:
 
     def __init__(self) -> None:
         self._odds = BinaryBayesFilter(0.5, (), LIMIT)
-        self._trail: deque[tuple[int, Matrix, float]] = deque(maxlen=64)
+        self._trail: deque[tuple[int, tuple[float, float], float]] = deque(maxlen=64)
 
     @property
     def leaves_alone(self) -> bool:
@@ -54,7 +53,8 @@ class Lie:
         if not absolute:
             self._compare(testimony, weight)
             return
-        self._trail.append((time, residual, float(testimony.noise.mean())))
+        north, east = residual.tolist()
+        self._trail.append((time, (north, east), sum(testimony.noise.tolist()) / 2.0))
         while time - self._trail[0][0] > BASE and len(self._trail) > 2:
             self._trail.popleft()
 
@@ -65,11 +65,13 @@ class Lie:
         elapsed = (end - start) / SECOND
         if elapsed < 0.5:
             return
-        rate = (last - first) / elapsed
         rate_variance = (noise + later_noise) / elapsed**2
-        velocity = testimony.residual
-        variance = 0.5 * float(testimony.spread.trace()) + float(testimony.noise.mean())
-        apart = velocity - rate
-        gain = float(apart @ apart) - 2.0 * rate_variance - float(velocity @ velocity)
+        north, east = testimony.residual.tolist()
+        (nn, _), (_, ee) = testimony.spread.tolist()
+        variance = 0.5 * (nn + ee) + sum(testimony.noise.tolist()) / 2.0
+        apart_north = north - (last[0] - first[0]) / elapsed
+        apart_east = east - (last[1] - first[1]) / elapsed
+        apart = apart_north * apart_north + apart_east * apart_east
+        gain = apart - 2.0 * rate_variance - (north * north + east * east)
         evidence = gain / (2.0 * (variance + rate_variance))
         self._odds.add(weight * min(MOST, max(-MOST, evidence)))

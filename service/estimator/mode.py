@@ -24,7 +24,7 @@ from filters.linearised.interacting import mix
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
-from filters.transition import DenseTransition
+from filters.transition import Drift
 from service.config import Configuration
 from service.estimate import MotionMode
 from service.estimator.ground import GroundVehicle
@@ -80,6 +80,7 @@ FAR = 16.0
 """Squared distance from the belief, in standard deviations, at which they begin anew as it is."""
 
 _MODES = tuple(MotionMode)
+_SLIPS, _GRIPS = float(GENERATOR[1, 2]), float(GENERATOR[2, 1])
 
 
 class Mode:
@@ -160,10 +161,10 @@ class Mode:
 
     def _tell(self, duration: float, control: UnicycleControl) -> None:
         """Let the modes change, and weigh them by wheels and gyro."""
-        matrix = np.eye(3) + min(duration, 1.0) * GENERATOR  # exp(Q t) to first order: strides are short
+        stretch = min(duration, 1.0)  # the filter is told ten times a second
         if self._bank.live.all():
-            mix(self._bank, _among_wheeled(matrix), self._modes.belief[1:] + 1e-12)
-        self._modes.propagate(DenseTransition(matrix))
+            mix(self._bank, _among_wheeled(stretch), self._modes.belief[1:] + 1e-12)
+        self._modes.propagate(Drift(GENERATOR, stretch))
         rolls, turns = self._looks(duration, control)
         logs = np.zeros(3)
         if control.distance_sigma == 0.0:
@@ -228,10 +229,10 @@ def _slip_variance(distance: float, duration: float) -> float:
     return 2.0 * GRIP * (SLIP * distance) ** 2 / duration
 
 
-def _among_wheeled(matrix: Matrix) -> Matrix:
+def _among_wheeled(duration: float) -> Matrix:
     """Return the transition between moving and slipping alone: of a vehicle that stands neither Gaussian moves."""
-    inner = matrix[1:, 1:] + np.diag(matrix[1:, 0])
-    return inner / inner.sum(axis=1, keepdims=True)
+    slips, grips = duration * _SLIPS, duration * _GRIPS
+    return np.array(((1.0 - slips, slips), (grips, 1.0 - grips)))
 
 
 def mode_of(configuration: Configuration, vehicle: Vehicle, belief: ParticleFilter[Any]) -> Mode | None:

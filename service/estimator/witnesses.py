@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filters.kalman import Matrix
+from filters.kernels.expectations import note
 from filters.linearised.bank import BATCHED, GaussianBank
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle
@@ -80,7 +81,7 @@ class Witnesses:
 
     def __init__(self, motion: Unicycle, slow: Sequence[SlowState], groups: int) -> None:
         self.bank = GaussianBank(motion, slow, SLOTS * groups)
-        self._began = np.zeros(SLOTS * groups, np.int64)
+        self._began = [0] * (SLOTS * groups)
         self._contradiction: Matrix = np.zeros(SLOTS * groups)
         self._wildness: Matrix = np.zeros(SLOTS * groups)
 
@@ -107,22 +108,33 @@ class Witnesses:
         if not chosen.any():
             return
         expectations = self.bank.expect(measured.model, measured.value)
-        nis = self.bank.correct(expectations, chosen, GATE).nis[chosen]
-        excess = np.minimum(nis, MOST_NIS) - expectations.residual.shape[1]
-        self._contradiction[chosen] += excess / measured.repeats
-        self._wildness[chosen] += WILD_MEMORY / measured.repeats * ((nis > WILD) - self._wildness[chosen])
+        nis = self.bank.correct(expectations, chosen, GATE).nis
+        components = expectations.residual.shape[1]
+        note.direct(
+            nis,
+            chosen,
+            components,
+            MOST_NIS,
+            WILD,
+            measured.repeats,
+            WILD_MEMORY,
+            self._contradiction,
+            self._wildness,
+        )
 
     def judging(self, group: int) -> int | None:
         """Return the member that judges the group: the older one; ``None`` if there is none."""
-        members = [m for m in range(SLOTS * group, SLOTS * (group + 1)) if self.bank.live[m]]
-        return min(members, key=lambda member: int(self._began[member]), default=None)
+        return min(self._members(group), key=self._began.__getitem__, default=None)
 
     def newest(self, group: int) -> int | None:
         """Return when the group's younger witness began, nanoseconds."""
-        began = [
-            int(self._began[SLOTS * group + k]) for k in range(SLOTS) if self.bank.live[SLOTS * group + k]
-        ]
-        return max(began, default=None)
+        return max([self._began[member] for member in self._members(group)], default=None)
+
+    def _members(self, group: int) -> list[int]:
+        """Return the group's witnesses that are live."""
+        first = SLOTS * group
+        live: list[bool] = self.bank.live[first : first + SLOTS].tolist()
+        return [first + slot for slot, one in enumerate(live) if one]
 
     def contradiction(self, group: int) -> float:
         """Return how far the others contradict the group's witness, nats over the last seconds: 0 is normal."""
@@ -136,24 +148,21 @@ class Witnesses:
 
     def testify(self, group: int, measured: Measurement) -> dict[int, Testimony]:
         """Say what each of the group's witnesses makes of a measurement of it, by member, the older one first."""
-        members = [m for m in range(SLOTS * group, SLOTS * (group + 1)) if self.bank.live[m]]
-        members.sort(key=lambda m: int(self._began[m]))
+        members = sorted(self._members(group), key=self._began.__getitem__)
         if not members or type(measured.model) not in BATCHED:
             return {}
         said = self.bank.expect(measured.model, measured.value)
         testimonies: dict[int, Testimony] = {}
         for member in members:
-            jacobian = said.jacobian[member]
-            spread = jacobian @ self.bank.covariance[member] @ jacobian.T
             testimonies[member] = Testimony(
-                said.residual[member], spread, said.noise[member] / measured.repeats
+                said.residual[member], self.bank.spread(said, member), said.noise[member] / measured.repeats
             )
         return testimonies
 
     def begin(self, group: int, time: int, mean: Matrix, covariance: Matrix) -> None:
         """Have a witness of the group begin at ``time`` with this Gaussian, in the place of the older one."""
         members = range(SLOTS * group, SLOTS * (group + 1))
-        member = min(members, key=lambda m: int(self._began[m]) if self.bank.live[m] else -(2**62))
+        member = min(members, key=lambda m: self._began[m] if self.bank.live[m] else -(2**62))
         self.bank.set(member, mean, covariance)
         self._began[member] = time
         self._contradiction[member] = 0.0
