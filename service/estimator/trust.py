@@ -27,11 +27,13 @@ from filters.belief import Evidence
 from filters.binary import BinaryBayesFilter
 from filters.error_level import ErrorLevel
 from filters.kalman import Matrix
+from filters.kernels.error_level import normalised
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from filters.regularization import root
 from filters.sensing import Heading, Position, Range, Velocity
+from filters.sensing.speed import WheelSpeed
 from service.config import Configuration
 from service.estimator.lie import Lie
 from service.estimator.measuring import Measurement
@@ -52,7 +54,7 @@ CALM = 3.0
 """Log odds from which nobody is under suspicion, and a group has shown that it agrees."""
 
 BEST = 0.58
-WORST: dict[type, float] = {Position: -8.0, Velocity: -3.0, Range: -2.0, Heading: -2.0}
+WORST: dict[type, float] = {Position: -8.0, Velocity: -3.0, Range: -2.0, Heading: -2.0, WheelSpeed: -2.0}
 """Log odds that a second of readings adds at most, for a sensor and against it: BEST / (BEST - WORST) is the share of
 wild readings that one lives with for ever. Among ranges they are many, among positions few."""
 
@@ -94,7 +96,7 @@ POISONED = 9.2
 NARROW, PLACED = 0.35, 5.0
 """Radians and metres: a belief with less spread than this is one place, and makes a witness."""
 
-USUAL: dict[type, float] = {Position: 5.0, Velocity: 0.5, Range: 1.5, Heading: 0.15}
+USUAL: dict[type, float] = {Position: 5.0, Velocity: 0.5, Range: 1.5, Heading: 0.15, WheelSpeed: 0.3}
 """Slow errors that an honest sensor may have whatever it claims: multipath of 5 m, a beacon's bias; m, m/s, rad."""
 
 
@@ -145,8 +147,7 @@ class Judged:
 
     def compare(self, testimony: Testimony, weight: float) -> None:
         """Note whether a reading is wild for its witness."""
-        residual, spread, noise = testimony
-        nis = float(residual @ np.linalg.solve(spread + np.diag(noise), residual))
+        nis = normalised.direct(*testimony)
         self.strange += weight / STRANGE * ((nis > WILD) - self.strange)
 
     def weight(self, time: int) -> float:
@@ -300,15 +301,20 @@ class Trust:
         """Move the witnesses, and have new ones begin when it is time."""
         self._time = end
         self._witnesses.move(self._control(start, end), (end - start) / SECOND)
-        trusted = [group for group in self._groups.values() if not group.flagged]
-        newest = [self._witnesses.newest(group.place) for group in trusted]
+        latest = end - min(SPAN // 2, max(YOUNGEST, (end - self._since) // 2))
         due = [
             group
-            for group, began in zip(trusted, newest, strict=True)
-            if began is None or end - began >= min(SPAN // 2, max(YOUNGEST, (end - self._since) // 2))
+            for group in self._groups.values()
+            if ((began := self._witnesses.newest(group.place)) is None or began <= latest)
+            and not group.flagged
         ]
-        if due and all(self._calm(sensor) for group in trusted for sensor in group.sensors.values()):
+        if due and self._all_calm():
             self._begin(due)
+
+    def _all_calm(self) -> bool:
+        """Say whether nobody of those who are trusted is under suspicion."""
+        trusted = (group for group in self._groups.values() if not group.flagged)
+        return all(self._calm(sensor) for group in trusted for sensor in group.sensors.values())
 
     def _calm(self, sensor: Judged) -> bool:
         return sensor.flagged or not sensor.agreed or self._odds.log_odds[sensor.place] >= CALM
