@@ -10,8 +10,16 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from filters.belief import Evidence
+from filters.belief import Belief, Evidence, Moments
 from service.estimator.binding import Measurement
+
+
+class Watched(Belief, Protocol):
+    """A belief that can be looked on without being moved."""
+
+    def glance(self) -> Moments:
+        """Say its moments, and go on as if nobody had asked."""
+        ...
 
 
 class Companion(Protocol):

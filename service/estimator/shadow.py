@@ -12,10 +12,11 @@ from collections import Counter
 
 import numpy as np
 
-from filters.belief import Belief, Evidence
+from filters.belief import Evidence
 from filters.linearised.shadow import LINEARISED, ShadowFilter
 from service.estimator.binding import Measurement
 from service.estimator.carrier import Pose
+from service.estimator.companion import Watched
 from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 
@@ -27,7 +28,7 @@ class Shadow:
     ----------
     vehicle : Vehicle
         The estimator's; its controls are read.
-    belief : Belief
+    belief : Watched
         The estimator's, to start from.
 
     Attributes
@@ -38,7 +39,7 @@ class Shadow:
         Why it has stopped, if it has: its numbers were no longer a Gaussian's.
     """
 
-    def __init__(self, vehicle: Vehicle, belief: Belief) -> None:
+    def __init__(self, vehicle: Vehicle, belief: Watched) -> None:
         self._vehicle = vehicle
         self._belief = belief
         self._filter = ShadowFilter(vehicle.motion, vehicle.slow_states)
@@ -89,7 +90,7 @@ class Shadow:
         return self._carrier.at(self._time, now)
 
     def _begin(self) -> bool:
-        moments = self._belief.moments()
+        moments = self._belief.glance()
         if not self._vehicle.linearisable(moments):
             return False
         self._filter.initialize(moments)
