@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.sample import Sample
-from filters.belief import Belief
 from filters.crew import Crew
 from filters.particle import ParticleFilter
 from service.checkpoint import Kept
 from service.config import Configuration, Start
 from service.estimate import Estimate, Hypotheses, SensorStatus
-from service.estimator.companion import Companion
+from service.estimator.companion import Companion, Watched
 from service.estimator.course import CROWD, Cause, Course, Level
 from service.estimator.deputy import Deputy
 from service.estimator.fusion import KALMAN, Fusion
@@ -124,7 +123,7 @@ class Estimator:
         self._told: Start | None = None
         self._spoken: Estimate | None = None
 
-    def accompany(self, make: Callable[[Vehicle, Belief], C]) -> C:
+    def accompany(self, make: Callable[[Vehicle, Watched], C]) -> C:
         """Have a companion told of every call on the belief from now on, and return it."""
         companion = make(self._vehicle, self._filter)
         self._fusion.companions.append(companion)
