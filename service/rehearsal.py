@@ -17,6 +17,7 @@ import msgspec
 
 from drivers.maps import landmarks
 from drivers.sample import (
+    Altitude,
     AnyReading,
     Bearing,
     Heading,
@@ -27,6 +28,7 @@ from drivers.sample import (
     Rotation,
     Sample,
     SampleBatch,
+    Speed,
     Velocity,
     decode,
     encode,
@@ -166,6 +168,10 @@ def _readings(sensor: Sensor, configuration: Configuration, north: float) -> lis
         return [RangeBearing(10.0, 0.0, landmark) for landmark in _landmarks(configuration.map.landmarks)]
     if sensor.kind == "heading":
         return [Heading(0.0)]
+    if sensor.kind == "speed":
+        return [Speed(_SPEED)]
+    if sensor.kind == "altitude":
+        return [Altitude(0.0)]
     return []
 
 

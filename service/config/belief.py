@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from service.config.section import (
     Flag,
+    ForwardRight,
     Interval,
     Latitude,
     Longitude,
@@ -147,7 +148,10 @@ class Motion(Section):
     vertical_sigma: NotNegative | None = None
     """For constant_velocity in 3 dimensions: velocity_sigma of the vertical axis; without it the same."""
     speed_from: Annotated[str, Field(min_length=1)] = "auto"
-    """Source of the speed: a message name as the wire has it (WHEEL_DISTANCE, esc.Status, …) or auto."""
+    """Source of the speed: a message name as the wire has it (WHEEL_DISTANCE, esc.Status, …), sensors, or auto.
+
+    sensors: every [[sensor]] of kind speed, weighted by its sigma and brought to the centre from its lever; of auto
+    they come after an odometer's distances, before single speeds. A speed that is no part of it is compared with it."""
     yaw_rate_from: Annotated[str, Field(min_length=1)] = "auto"
     """Source of the yaw rate: a message name (RAW_IMU, HIGHRES_IMU, ahrs.RawIMU, …), wheels, or auto."""
     yaw_rate_delay_ms: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=500)] = 0.0
@@ -180,7 +184,8 @@ class Sensor(Section):
     outliers: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=1)] = 0.05
     """Share of readings that mean nothing."""
     estimate: tuple[SlowState, ...] = ()
-    """Slow states to estimate with the pose: of ranges scale and bias, of positions and velocities delay.
+    """Slow states to estimate with the pose: of ranges and speeds scale and bias, of altitudes bias, of positions and
+    velocities delay.
 
     A receiver's positions and velocities share one delay; it shows only where odometry tells how the vehicle moves."""
     delay_ms: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=10_000)] = 0.0
@@ -192,12 +197,23 @@ class Sensor(Section):
     correlation_s: NotNegative | None = None
     """Seconds over which its errors stay alike: readings closer together count as one.
 
-    Default: 1 for position, velocity and heading, 0 (every reading counts for itself) for all others. Of a position
+    Default: 1 for position, velocity, heading and altitude, 0.2 for speed, 0 (every reading counts for itself) for all
+    others. Of a position
     above 0, the part of its error that lasts for a minute is added to what is published."""
-    bias_sigma: NotNegative = 0.2
-    """What an estimated bias may be at the start, in the reading's unit (one standard deviation)."""
-    bias_walk: NotNegative = 0.003
-    """Random walk of an estimated bias of ranges, m per √s; every beacon has its own."""
+    bias_sigma: NotNegative | None = None
+    """What an estimated bias may be at the start, in the reading's unit (one standard deviation).
+
+    Default: 0.2 m of a range, where every beacon has its own; 100 m of an altitude, the weather; 0.1 m/s of a speed."""
+    bias_walk: NotNegative | None = None
+    """Random walk of an estimated bias, in the reading's unit per √s.
+
+    Default: 0.003 of ranges, 0.02 of altitudes, 0.001 of speeds."""
+    lever: ForwardRight | None = None
+    """Of a speed: where it is measured, metres forward and right of the vehicle's centre.
+
+    A wheel at the side goes slower when the vehicle turns to that side. Default: at the centre."""
+    index: Annotated[Whole, Field(ge=0, le=255)] | None = None
+    """Of a speed: which wheel or motor of those that one message says, from 0; without it: the mean of all."""
     nlos: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=0.9)] = 0.0
     """Of ranges: share of readings that are too long, because something stands in the way."""
     nlos_length: Positive = 1.0
@@ -258,5 +274,7 @@ class Honesty(Section):
     """Notice that the belief is lost, and search for the place anew."""
     trust: bool = True
     """Flag a sensor that disagrees with all others, and ignore it until it has earned trust again."""
+    noise_learning: bool = True
+    """Learn how much of the noise that is stated for motion and sensors there really is."""
     motion_mode: bool = True
     """Tell standing still and slipping from moving, and treat the odometry accordingly."""

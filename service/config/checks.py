@@ -22,8 +22,8 @@ Table = Mapping[str, Any]
 NOT_BUILT: dict[tuple[str, str], tuple[frozenset[object], str]] = {
     ("vehicle", "motion"): (frozenset({"drift", "inertial"}), "constant_velocity, unicycle"),
     ("sensor", "kind"): (
-        frozenset({"altitude", "terrain", "scan", "speed"}),
-        "position, velocity, range, bearing, range_bearing, heading",
+        frozenset({"terrain", "scan"}),
+        "position, velocity, range, bearing, range_bearing, heading, altitude, speed",
     ),
     ("link", "send"): (frozenset({"odometry", "gps_input", "global_position_sensor"}), "none"),
 }
@@ -121,8 +121,14 @@ _SLOW_STATES: dict[str, tuple[str, ...]] = {
     "range": ("scale", "bias"),
     "position": ("delay",),
     "velocity": ("delay",),
+    "speed": ("scale", "bias"),
+    "altitude": ("bias",),
 }
-_OWNERS = {"scale": "ranges", "bias": "ranges", "delay": "positions and velocities"}
+_OWNERS = {
+    "scale": "ranges and speeds",
+    "bias": "ranges, speeds and altitudes",
+    "delay": "positions and velocities",
+}
 
 
 def _slow_states_of_others(raw: Table) -> Iterator[str]:
@@ -144,6 +150,23 @@ def _headings_of_tags(raw: Table) -> Iterator[str]:
         if kind in _POINTING:
             where = place_in_words((*place, "kind"), raw)
             yield f'{where}: {shown(kind)} needs a heading, which motion = "constant_velocity" has not; leave it out'
+
+
+def _wheels_of_others(raw: Table) -> Iterator[str]:
+    """Say where facts of a speed stand beside another kind, or beside a vehicle that they say nothing of."""
+    free = table(raw, "vehicle").get("motion") == "constant_velocity"
+    speeds = 0
+    for place, sensor in entries(raw, "sensor"):
+        kind = sensor.get("kind")
+        speeds += kind == "speed"
+        for key in ("lever", "index"):
+            if key in sensor and isinstance(kind, str) and kind != "speed":
+                yield f'{place_in_words((*place, key), raw)}: belongs to kind = "speed", and this is {shown(kind)}'
+        if free and kind == "speed" and "lever" in sensor:
+            where = place_in_words((*place, "lever"), raw)
+            yield f'{where}: needs a heading, which motion = "constant_velocity" has not; leave it out'
+    if table(raw, "motion").get("speed_from") == "sensors" and not speeds:
+        yield 'motion, speed_from: "sensors" needs at least one [[sensor]] of kind = "speed"'
 
 
 def _slow_states_only_once(raw: Table) -> Iterator[str]:
@@ -205,6 +228,7 @@ def across_sections(raw: Table) -> list[str]:
         *_headings_of_tags(raw),
         *_slow_states_of_others(raw),
         *_slow_states_only_once(raw),
+        *_wheels_of_others(raw),
         *_absent_files(raw),
         *wrong_landmarks(raw),
         *wrong_signals(entries(raw, "link"), raw),

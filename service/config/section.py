@@ -82,6 +82,7 @@ NorthEastDown = Annotated[tuple[Number, Number, Number], BeforeValidator(_number
 SigmaNorthEastDown = Annotated[
     tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_numbers("north", "east", "down"))
 ]
+ForwardRight = Annotated[tuple[Number, Number], BeforeValidator(_numbers("forward", "right"))]
 Interval = Annotated[
     tuple[Number, Number], BeforeValidator(_numbers("lowest", "highest")), AfterValidator(_ascending)
 ]

@@ -9,10 +9,13 @@ origin yet, no such beacon) is refused with a reason, and the reason is counted.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 from drivers.sample import Inertial, Sample
 from filters.sensing import PositionMeasurement
 from service.config import Sensor
+from service.estimator.controls import Choice, Source
 from service.estimator.measuring import (
     KINDS,
     Measurement,
@@ -32,6 +35,12 @@ SHORTEST_INTERVAL = 1e-3
 
 TIMING = 0.02
 """Seconds by which a stamp may be off after its clock was mapped: at speed v, v times this many metres."""
+
+MOST_SPEAKERS = 64
+"""Sources are named from outside: of more than so many that one sensor hears all are forgotten."""
+
+CONTROL = "control"
+"""Why a speed is no measurement: it is the control, or part of it."""
 
 __all__ = [
     "BoundSensor",
@@ -66,6 +75,12 @@ class BoundSensor:
         self.surroundings = surroundings
         self.delay = round(settings.delay_ms * 1e6)
         self._kind = KINDS[settings.kind]
+        self.memory: Any = None
+        self._memories: dict[tuple[str, str], Any] = {}
+        self._speaker = Choice() if self._kind.alone else None
+        self.part = self._kind.part(settings)
+        self._label = self._kind.label(settings)
+        self._beside = settings.kind == "speed" and surroundings.rolls
         self._last_magnetic = -(2**62)
         self._last_time = -(2**62)
         self._repeats = 1.0
@@ -78,7 +93,7 @@ class BoundSensor:
     @property
     def title(self) -> str:
         """Kind and link, as the configuration names them."""
-        return f"{self.settings.kind}/{self.settings.link or '*'}"
+        return f"{self.settings.kind}/{self.settings.link or '*'}{self._label}"
 
     def wants(self, sample: Sample) -> bool:
         """Say whether ``sample`` is this sensor's."""
@@ -89,6 +104,8 @@ class BoundSensor:
             return False
         if not isinstance(sample.reading, kind.readings) or not kind.wants(settings, sample.reading):
             return False
+        if self._speaker is not None:
+            return self._speaker.accepts(Source(0, sample.link, sample.source), sample.time)
         return not isinstance(sample.reading, Inertial) or self._in_turn(sample.time)
 
     def _in_turn(self, time: int) -> bool:
@@ -99,20 +116,40 @@ class BoundSensor:
 
     def name(self, sample: Sample) -> str:
         """Return the name under which a sample's fate is recorded: kind, link, and the beacon where there is one."""
-        return f"{self.settings.kind}/{sample.link}{self._kind.suffix(sample.reading)}"
+        return f"{self.settings.kind}/{sample.link}{self._label}{self._kind.suffix(sample.reading)}"
 
     def measure(self, sample: Sample, place: Place) -> Measurement | Refusal:
         """Return ``sample`` as a measurement, or why it cannot be one."""
-        outcome = self._kind.measure(self, sample.reading, place)
         name = self.name(sample)
+        if self._beside and place.controls.holds(sample):
+            return Refusal(name, CONTROL)
+        if self._kind.memory is not None:
+            self.memory = self._memory_of(sample, self._kind.memory)
+        outcome = self._kind.measure(self, sample.reading, place)
         if isinstance(outcome, str):
             return Refusal(name, outcome)
         lasting = 0.0
         if self._lasts and isinstance(outcome, PositionMeasurement) and outcome.sigma_north:
             lasting = outcome.sigma_north**2 / self._repeats
         return Measurement(
-            name, self.model, outcome, self._kind.absolute, self._log_outlier, self._repeats, lasting
+            name,
+            self.model,
+            outcome,
+            self._kind.absolute,
+            self._log_outlier,
+            self._repeats,
+            lasting,
+            self._correlation == 0.0,
+            TIMING if self.delay > 0 else 0.0,
         )
+
+    def _memory_of(self, sample: Sample, make: Callable[[Sensor, Surroundings], Any]) -> Any:
+        speaker = (sample.link, sample.source)
+        if speaker not in self._memories:
+            if len(self._memories) >= MOST_SPEAKERS:
+                self._memories.clear()
+            self._memories[speaker] = make(self.settings, self.surroundings)
+        return self._memories[speaker]
 
     def sigma(self, claimed: float | None) -> float:
         """Return the larger of what the configuration and the reading say; each knows of errors the other does not."""

@@ -27,6 +27,7 @@ from drivers.sample import (
     Speed,
 )
 from service.config.belief import Motion as MotionSettings
+from service.config.belief import Sensor
 from service.estimator.track import (
     FASTEST,
     FASTEST_TURN,
@@ -37,6 +38,7 @@ from service.estimator.track import (
     TotalTrack,
     Track,
 )
+from service.estimator.wheels import Wheels
 
 SILENCE = SECOND
 """A source that said nothing for this long gives way to the next one in rank."""
@@ -78,6 +80,12 @@ YAW_RATE_RANKS = {
 """Floating point before integers (RAW_IMU counts whole mrad/s); the first unit before the second."""
 
 
+SENSORS = "sensors"
+"""What the speed is from that all ``[[sensor]]`` of kind speed say together."""
+
+SENSORS_RANK = 1
+"""After totals of an odometer, before any single speed."""
+
 WHEELS = "wheels"
 WHEELS_RANK = 150
 """Yaw rate from two wheels: after any gyro and the autopilot's attitude, before what was merely commanded."""
@@ -105,9 +113,13 @@ class Controls:
         Which actuator drives; its command is the last resort for the speed.
     yaw_rate_delay : int
         By how much a gyro's yaw rate is older than its stamp, nanoseconds.
+    wheels : Wheels or None
+        The speed sensors, if there are any.
 
     Attributes
     ----------
+    heard : int
+        How often the motion may have become another one: samples taken, and what was forgotten.
     out_of_order, implausible : int
         Readings that were not used: older than the one before of the same speaker, or no motion at all.
     """
@@ -120,6 +132,7 @@ class Controls:
         yaw_rate_from: str = "auto",
         throttle: Throttle | None = None,
         yaw_rate_delay: int = 0,
+        wheels: Wheels | None = None,
     ) -> None:
         self.wheel_radius = wheel_radius
         self.wheel_track = wheel_track
@@ -127,8 +140,11 @@ class Controls:
         self.yaw_rate_from = yaw_rate_from
         self.throttle = throttle
         self.yaw_rate_delay = yaw_rate_delay
+        self.heard = 0
         self.out_of_order = 0
         self.implausible = 0
+        self._wheels = wheels
+        self._doubt = RateTrack()
         self._motors: dict[tuple[str, str], dict[int, tuple[int, float]]] = {}
         self._difference: tuple[int, float, object] | None = None
         self._distance: Track = Track()
@@ -150,6 +166,7 @@ class Controls:
 
     def take(self, sample: Sample) -> bool:
         """Use ``sample`` if it is a control; return whether it was one (used or outranked)."""
+        self.heard += 1
         reading = sample.reading
         if isinstance(reading, Inertial):
             if reading.angular_velocity is not None:
@@ -163,7 +180,17 @@ class Controls:
             if reading.angular_velocity is not None:
                 self._take_gyro(sample, reading.angular_velocity[2], 100)
             return True
+        if self._wheels is not None and self._wheels.wants(sample):
+            self._take_wheels(sample, self._wheels)
+            return not isinstance(reading, Odometer) or self._take_distance(sample)
         return self._take_distance(sample)
+
+    def holds(self, sample: Sample) -> bool:
+        """Say whether a speed is the control, or part of it."""
+        source = self._speaker.source
+        if source is None or source.name == SENSORS:
+            return source is not None
+        return (source.link, source.name) == (sample.link, sample.source)
 
     def _take_distance(self, sample: Sample) -> bool:
         reading = sample.reading
@@ -188,6 +215,18 @@ class Controls:
             self._take_command(sample, reading)
             return True
         return False
+
+    def _take_wheels(self, sample: Sample, wheels: Wheels) -> None:
+        """Feed the speed that all speed sensors make together, where nothing better speaks."""
+        fused = wheels.take(sample, self._turn.rate(sample.time))
+        if fused is None or self.speed_from not in ("auto", SENSORS):
+            return
+        if not self._speaker.accepts(Source(SENSORS_RANK, "", SENSORS), sample.time):
+            return
+        if not isinstance(self._distance, RateTrack):
+            self._distance = RateTrack()
+        self.out_of_order += not self._distance.append(sample.time, fused.speed)
+        self._doubt.append(sample.time, fused.density)
 
     def _take_odometer(self, sample: Sample, reading: Odometer) -> None:
         if not reading.distance:
@@ -273,6 +312,13 @@ class Controls:
         """Return metres rolled between two times, and the seconds of them without knowledge."""
         return self._distance.between(start, end)
 
+    def doubt(self, start: int, end: int) -> float:
+        """Return the variance (m²) that the speed sensors themselves leave of the distance between two times."""
+        source = self._speaker.source
+        if source is None or source.name != SENSORS:
+            return 0.0
+        return max(0.0, self._doubt.between(start, end).total)
+
     def turn(self, start: int, end: int) -> Motion:
         """Return radians turned clockwise between two times, and the seconds of them without knowledge."""
         return self._turn.between(start, end)
@@ -295,13 +341,16 @@ class Controls:
 
     def forget(self, before: int) -> None:
         """Drop what lies before ``before`` (nanoseconds) and is no longer needed."""
+        self.heard += 1
         self._distance.forget(before)
+        self._doubt.forget(before)
         self._turn.forget(before)
 
 
-def controls_of(settings: MotionSettings) -> Controls:
-    """Return the controls that ``[motion]`` asks for."""
+def controls_of(settings: MotionSettings, sensors: Sequence[Sensor] = ()) -> Controls:
+    """Return the controls that ``[motion]`` asks for, with the speed sensors among ``sensors``."""
     throttle = None
+    speeds = any(sensor.kind == "speed" for sensor in sensors)
     if settings.throttle_channel is not None:
         throttle = Throttle(settings.throttle_channel, settings.throttle_speed)
     return Controls(
@@ -311,4 +360,5 @@ def controls_of(settings: MotionSettings) -> Controls:
         settings.yaw_rate_from,
         throttle,
         round(settings.yaw_rate_delay_ms * 1e6),
+        Wheels(sensors, settings.wheel_radius) if speeds else None,
     )

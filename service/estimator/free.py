@@ -6,6 +6,8 @@ is not known of it is in the belief, and the ranges may learn it.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,13 +27,15 @@ from filters.motion.constant_velocity import (
 from filters.motion.learned import SlowState
 from filters.motion.slow import RandomWalk
 from filters.particle import ParticleFilter
+from filters.sensing import Sensor
+from filters.sensing.altitude import Altitude
 from filters.sensing.down import Down, DownMeasurement
 from service.config import Configuration
 from service.estimate import Triangle, Triple
 from service.estimator.carrier import Carrier, Pose
 from service.estimator.controls import Controls, controls_of
-from service.estimator.height import CLIMB, Height, down_of, height_state
-from service.estimator.start import Anchor, sensor_states
+from service.estimator.height import Height, climb_of, down_of, height_of, height_state
+from service.estimator.start import Anchor, altitude_biases, sensor_states
 from service.estimator.track import SECOND
 from service.geodesy import LocalFrame
 
@@ -58,9 +62,11 @@ class FreeVehicle:
         self.timing_sigma = settings.timing_sigma
         self.controls: Controls = controls_of(settings)
         self.slow_states: list[SlowState] = sensor_states(configuration)
-        self._height = Height() if height_state(configuration) is None else None
+        self._height = height_of(configuration) if height_state(configuration) is None else None
+        if self._height is None:
+            self.slow_states.extend(altitude_biases(configuration))
         if self._height is None and settings.dimensions == 2:
-            self.slow_states.append(RandomWalk(DOWN, CLIMB))
+            self.slow_states.append(RandomWalk(DOWN, climb_of(configuration)))
 
     def predict(self, belief: ParticleFilter[FreeControl], start: int, end: int) -> None:
         """Move the particles from ``start`` to ``end`` (nanoseconds)."""
@@ -104,6 +110,15 @@ class FreeVehicle:
     def down(self) -> float:
         """Down, where the particles do not have it, or 0."""
         return 0.0 if self._height is None else self._height.down
+
+    @property
+    def height_biases(self) -> dict[str, tuple[float, float]]:
+        """Biases of the altitudes that correct the height, where the particles do not have it."""
+        return {} if self._height is None else self._height.biases
+
+    def height_for(self, model: Sensor[Any]) -> Height | None:
+        """Return the height, where the particles do not have it, for a measurement of it."""
+        return self._height if isinstance(model, Altitude) else None
 
     def level(
         self,

@@ -6,13 +6,16 @@ every step.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 from filters.particle import ParticleFilter
-from service.estimator.binding import Measurement, Place, Refusal
+from filters.sensing.altitude import Altitude
+from service.estimator.binding import CONTROL, Measurement, Place, Refusal
+from service.estimator.caution import Caution
 from service.estimator.companion import Companion
 from service.estimator.course import Course, Level
 from service.estimator.deputy import Deputy
+from service.estimator.height import Height
 from service.estimator.intake import Intake, Passed, Waiting
 from service.estimator.latecomers import Latecomers
 from service.estimator.population import Population
@@ -74,6 +77,8 @@ class Fusion:
         Takes the measurements instead of the belief while that has no place.
     trust : Trust or None
         Asked before each measurement whether its sensor is believed; a companion, too.
+    caution : Caution or None
+        Says what a sensor's readings are worth; a companion, too.
     latecomers : Latecomers or None
         Who weighs the belief by measurements that come after the horizon has passed them.
     taken_back : int
@@ -94,6 +99,7 @@ class Fusion:
         self.deputy: Deputy | None = None
         self.search: Search | None = None
         self.trust: Trust | None = None
+        self.caution: Caution | None = None
         self.taken_back = 0
         self.latecomers: Latecomers | None = None
         self._vehicle = vehicle
@@ -165,6 +171,10 @@ class Fusion:
         if measured is None:
             return
         record = self._intake.records.of(measured.name)
+        height = self._vehicle.height_for(measured.model)
+        if height is not None:
+            self._weigh_height(height, time, measured, record)
+            return
         if self.trust is not None and (self.trust.log_odds(measured.name) or 0.0) < 0.0:
             record.refused["distrusted"] += 1
             return
@@ -210,6 +220,10 @@ class Fusion:
         if measured is None:
             return
         record = self._intake.records.of(measured.name)
+        height = self._vehicle.height_for(measured.model)
+        if height is not None:
+            self._weigh_height(height, time, measured, record)
+            return
         believed = self._believed(time, waiting, measured)
         self._charge(WITNESSES)
         if not believed:
@@ -220,12 +234,31 @@ class Fusion:
 
     def _measured(self, time: int, waiting: Waiting) -> Measurement | None:
         """Return what was read in its model's terms; ``None``, and the reason counted, where that cannot be."""
-        place = Place(time, self._intake.frame, self._vehicle.down, self._vehicle.controls)
+        vehicle = self._vehicle
+        place = Place(time, self._intake.frame, vehicle.down, vehicle.controls, vehicle.motion)
         measured = waiting.sensor.measure(waiting.sample, place)
         if not isinstance(measured, Refusal):
             return measured
-        self._intake.records.of(measured.name).refused[measured.reason] += 1
+        record = self._intake.records.of(measured.name)
+        if measured.reason == CONTROL:
+            record.accepted += 1
+            record.last = time
+        else:
+            record.refused[measured.reason] += 1
         return None
+
+    def _weigh_height(self, height: Height, time: int, measured: Measurement, record: SensorRecord) -> None:
+        """Correct the height, where it is beside the particles, by an altitude of ``time`` or before."""
+        assert self.time is not None
+        age = max(0.0, (self.time - time) / SECOND)
+        evidence = height.weigh(cast(Altitude, measured.model), measured.value, measured.log_outlier, age)
+        if evidence is None or not evidence.accepted:
+            record.refused["no_height" if evidence is None else "invalid"] += 1
+            return
+        record.innovation = evidence.innovation
+        record.last = time
+        record.judge(measured.surprise(evidence.log_mean) > OUTLIER)
+        self._charge("sensing")
 
     def _believed(self, time: int, waiting: Waiting, measured: Measurement) -> bool:
         """Ask whether the sensor is trusted; what one that was just found out did to the belief is taken back."""
@@ -247,7 +280,8 @@ class Fusion:
             record.accepted += 1
             record.last = time
             return
-        evidence = self._acting.weigh(measured.model, measured.value)
+        worth = measured if self.caution is None else self.caution.sized(measured)
+        evidence = self._acting.weigh(worth.model, worth.value)
         if not evidence.accepted:
             record.refused["invalid"] += 1
             return

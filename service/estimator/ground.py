@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import Any, Protocol
 
 from drivers.sample import AnyReading
 from filters.belief import Belief, Displacement, Moments
@@ -13,10 +13,12 @@ from filters.motion.prediction import IntervalNoise, process_covariance, velocit
 from filters.motion.standing import StandingUnicycle
 from filters.motion.unicycle import GYRO_BIAS, ODOMETRY_SCALE, UnicycleControl
 from filters.particle import ParticleFilter
+from filters.sensing import Sensor
+from filters.sensing.altitude import Altitude
 from service.config import Configuration
 from service.estimator.carrier import Carrier, Pose
 from service.estimator.controls import Controls, controls_of
-from service.estimator.height import Height, down_of
+from service.estimator.height import Height, down_of, height_of
 from service.estimator.start import Anchor, sensor_states
 from service.estimator.track import SECOND, SPEED_WINDOW
 from service.geodesy import LocalFrame
@@ -77,10 +79,16 @@ class GroundVehicle:
             gyro_bias_sigma=settings.gyro_bias_sigma,
             odometry_scale_sigma=settings.odometry_scale_sigma,
         )
-        self.controls: Controls = controls_of(settings)
+        self.controls: Controls = controls_of(settings, configuration.sensor)
         self.slow_states: list[SlowState] = sensor_states(configuration)
-        self._height = Height()
+        self._height = height_of(configuration)
         self._gait: Gait | None = None
+        self._rolled = (-1, -1, -1, UnicycleControl(0.0, 0.0))
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is certain to stand still over the stretch that was moved last."""
+        return self._gait is not None and self._gait.stands
 
     def heed(self, gait: Gait) -> None:
         """Heed from now on whether the vehicle stands and how far its wheels are to be doubted."""
@@ -98,28 +106,38 @@ class GroundVehicle:
             turn = self.rolled(start, end).turn
             self.motion.stand(belief.column(GYRO_BIAS), belief.weights, turn, duration)
         else:
-            belief.predict(self.control(start, end), duration)
+            with self.motion.as_learned():
+                belief.predict(self.control(start, end), duration)
         self._height.wander(duration)
 
     def control(self, start: int, end: int) -> UnicycleControl:
         """Return what odometer and gyro say of ``start`` to ``end``, doubted as far as the wheels slip."""
         rolled = self.rolled(start, end)
-        if self._gait is None:
-            return rolled
-        doubt = self._gait.doubt(rolled.distance, (end - start) / SECOND)
+        doubt = self.controls.doubt(start, end)
+        if self._gait is not None:
+            doubt += self._gait.doubt(rolled.distance, (end - start) / SECOND)
         return (
             rolled._replace(distance_sigma=math.sqrt(rolled.distance_sigma**2 + doubt)) if doubt else rolled
         )
 
     def rolled(self, start: int, end: int) -> UnicycleControl:
         """Return what odometer and gyro say of ``start`` to ``end``, with what is unknown of it as a sigma."""
+        heard = self.controls.heard
+        if self._rolled[:3] == (
+            start,
+            end,
+            heard,
+        ):  # belief and companions ask for a stretch one after the other
+            return self._rolled[3]
         distance, turn = self.controls.distance(start, end), self.controls.turn(start, end)
-        return UnicycleControl(
+        control = UnicycleControl(
             distance.total,
             turn.total,
             UNKNOWN_SPEED * math.sqrt(2.0 * PERSISTENCE * max(0.0, distance.unknown)),
             UNKNOWN_YAW_RATE * math.sqrt(2.0 * PERSISTENCE * max(0.0, turn.unknown)),
         )
+        self._rolled = (start, end, heard, control)
+        return control
 
     def displacement(self, start: int, end: int, biases: tuple[float, float]) -> Displacement:
         """Return the body's rigid motion from ``start`` to ``end``, corrected by (gyro bias, odometry scale)."""
@@ -137,8 +155,11 @@ class GroundVehicle:
         return Displacement(forward, right, turn)
 
     def noise(self, start: int, end: int) -> IntervalNoise:
-        """Return the process noise of an interval, as the motion model has it."""
-        return IntervalNoise(*self.motion.noise_variances(self.control(start, end), (end - start) / SECOND))
+        """Return the process noise of an interval, as the particles are moved with it."""
+        with self.motion.as_learned():
+            return IntervalNoise(
+                *self.motion.noise_variances(self.control(start, end), (end - start) / SECOND)
+            )
 
     def speed_variance(self, time: int) -> float:
         """Return the variance of the speed that is published for ``time``, (m/s)².
@@ -178,6 +199,15 @@ class GroundVehicle:
     def down(self) -> float:
         """Down, or the origin's own height while unknown."""
         return self._height.down
+
+    @property
+    def height_biases(self) -> dict[str, tuple[float, float]]:
+        """Biases of the altitudes that correct the height, each with its standard deviation, metres."""
+        return self._height.biases
+
+    def height_for(self, model: Sensor[Any]) -> Height | None:
+        """Return the height, for a measurement of it."""
+        return self._height if isinstance(model, Altitude) else None
 
     def level(
         self,

@@ -25,11 +25,15 @@ from filters.sensing import (
     RangeBearingMeasurement,
     RangeMeasurement,
 )
+from filters.sensing.altitude import Altitude, AltitudeMeasurement
 from filters.sensing.biased_range import BiasedRange, BiasedRangeMeasurement
 from service.estimator.measuring import Measurement
 from service.estimator.way import Shape
 
 Array = NDArray[np.float64]
+
+UNKNOWN_BIAS = 1e4
+"""Metres: an altitude whose bias nobody has learned yet says nothing."""
 
 
 class Heard(NamedTuple):
@@ -128,10 +132,17 @@ def _heading(measured: Measurement, _variance: float, turn: float) -> HeadingMea
     return value._replace(sigma=math.sqrt(sigma * sigma + turn))
 
 
+def _altitude(measured: Measurement, _variance: float, _turn: float) -> AltitudeMeasurement:
+    """Return an altitude; of one with a bias nothing is known here."""
+    value = cast(AltitudeMeasurement, measured.value)
+    return value if cast(Altitude, measured.model).bias is None else value._replace(sigma=UNKNOWN_BIAS)
+
+
 _WIDEN: dict[type, Callable[[Measurement, float, float], Any]] = {
     RangeMeasurement: _range,
     BiasedRangeMeasurement: _range,
     RangeBearingMeasurement: _landmark,
     PositionMeasurement: _position,
     HeadingMeasurement: _heading,
+    AltitudeMeasurement: _altitude,
 }

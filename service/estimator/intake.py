@@ -146,6 +146,19 @@ class Intake:
         sensor = next((sensor for sensor in self._sensors if sensor.wants(sample)), None)
         if sensor is None:
             return
+        self._wait(sensor, sample)
+        if sensor.part is not None:
+            self._share(sensor, sample)
+
+    def _share(self, first: BoundSensor, sample: Sample) -> None:
+        """Have the other parts of a sample wait for sensors of their own, each for the first that wants it."""
+        taken = {first.part, None}
+        for sensor in self._sensors:
+            if sensor.part not in taken and sensor.wants(sample):
+                taken.add(sensor.part)
+                self._wait(sensor, sample)
+
+    def _wait(self, sensor: BoundSensor, sample: Sample) -> None:
         record = self.records.of(sensor.name(sample))
         record.arrivals += 1
         if implausible(sample.reading) is not None:

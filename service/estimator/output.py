@@ -109,7 +109,7 @@ class Output:
             hypotheses=self._tracker.count if sampled and self._tracker is not None else 1,
             particles=self._belief.count if sampled else 0,
             effective_sample_size=pose.moments.effective_sample_size if sampled else None,
-            biases=self._slow_states(pose.moments),
+            biases=self._slow_states(pose.moments) | self._vehicle.height_biases,
             **figures,
         )
 

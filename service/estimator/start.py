@@ -49,8 +49,16 @@ MARGINALISED = {
 """Mean and spread of the columns whose own spread at the start the motion model knows."""
 
 
+BIASES = {"range": (0.2, 0.003), "altitude": (100.0, 0.02), "speed": (0.1, 0.001)}
+"""What a bias may be at the start, and its walk per √s, where the configuration does not say, by kind. Of an altitude
+it is the weather, which moves a barometer by a metre an hour, and more where a front goes through."""
+
+
 def sensor_states(configuration: Configuration) -> list[SlowState]:
-    """Return the slow states that the sensors ask for, each once: ranges have one bias for each beacon."""
+    """Return the slow states that the sensors ask for, each once: ranges have one bias for each beacon.
+
+    Biases of altitudes are not among them (:func:`altitude_biases`).
+    """
     sampled = [
         RandomWalk(name, DELAY_WALK if name == DELAY else SENSOR_WALK)
         for name in _sensor_sigmas(configuration)
@@ -73,10 +81,39 @@ def biased_beacons(sensor: Sensor, configured: Iterable[int]) -> list[int]:
     return [beacon for beacon in configured if sensor.beacons is None or beacon in sensor.beacons]
 
 
+def slow_state(sensor: Sensor, what: str) -> str:
+    """Return the name of a sensor's slow state; ranges share theirs, of all others each sensor has its own."""
+    index = None if sensor.index is None else str(sensor.index)
+    own = () if sensor.kind == "range" else (sensor.link, sensor.source, index)
+    return "/".join([f"{sensor.kind}_{what}", *(part for part in own if part is not None)])
+
+
+def learned_bias(sensor: Sensor, name: str) -> Learned:
+    """Return a bias of a sensor under a name, as its settings and its kind have it."""
+    sigma, walk = BIASES[sensor.kind]
+    return Learned(
+        name,
+        walk if sensor.bias_walk is None else sensor.bias_walk,
+        sigma if sensor.bias_sigma is None else sensor.bias_sigma,
+    )
+
+
+def altitude_biases(configuration: Configuration) -> list[Learned]:
+    """Return the biases of altitudes: slow states of whoever has the height."""
+    sensors = {
+        slow_state(sensor, "bias"): sensor
+        for sensor in configuration.sensor
+        if sensor.kind == "altitude" and "bias" in sensor.estimate
+    }
+    return [learned_bias(sensor, name) for name, sensor in sensors.items()]
+
+
 def _biases(sensor: Sensor, configuration: Configuration) -> list[Learned]:
+    if sensor.kind == "speed" and "bias" in sensor.estimate:
+        return [learned_bias(sensor, slow_state(sensor, "bias"))]
     configured = [beacon.id for beacon in configuration.beacon]
     beacons = biased_beacons(sensor, configured)
-    return [Learned(beacon_bias(beacon), sensor.bias_walk, sensor.bias_sigma) for beacon in beacons]
+    return [learned_bias(sensor, beacon_bias(beacon)) for beacon in beacons]
 
 
 def _sensor_sigmas(configuration: Configuration) -> dict[str, tuple[float, float]]:
@@ -84,9 +121,7 @@ def _sensor_sigmas(configuration: Configuration) -> dict[str, tuple[float, float
     sigmas: dict[str, tuple[float, float]] = {}
     for sensor in configuration.sensor:
         if "scale" in sensor.estimate:
-            sigmas.setdefault(f"{sensor.kind}_scale", (1.0, sensor.scale_sigma))
-        if "bias" in sensor.estimate and sensor.kind != "range":
-            sigmas.setdefault(f"{sensor.kind}_bias", (0.0, sensor.bias_sigma))
+            sigmas.setdefault(slow_state(sensor, "scale"), (1.0, sensor.scale_sigma))
         if "delay" in sensor.estimate:
             sigmas.setdefault(DELAY, (0.0, sensor.delay_sigma))
     return sigmas

@@ -13,11 +13,13 @@ from filters.belief import Belief, Moments
 from filters.motion.learned import SlowState
 from filters.motion.model import Motion
 from filters.particle import ParticleFilter
+from filters.sensing import Sensor as SensorModel
 from service.config import Configuration
 from service.estimator.carrier import Carrier
 from service.estimator.controls import Controls
 from service.estimator.free import FreeVehicle
 from service.estimator.ground import GroundVehicle
+from service.estimator.height import Height
 from service.estimator.start import Anchor
 from service.geodesy import LocalFrame
 
@@ -73,6 +75,15 @@ class Vehicle(Protocol):
     @property
     def down(self) -> float:
         """Down, or 0 while unknown or a state of the particles."""
+        ...
+
+    @property
+    def height_biases(self) -> dict[str, tuple[float, float]]:
+        """Biases of the altitudes that correct that height, each with its standard deviation, metres."""
+        ...
+
+    def height_for(self, model: SensorModel[Any]) -> Height | None:
+        """Return who takes a measurement of ``model``, if that is of the height and the particles do not have it."""
         ...
 
     def level(

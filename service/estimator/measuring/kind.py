@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
+from filters.motion.model import Motion
 from filters.sensing import Sensor as SensorModel
 from service.config import Beacon, Sensor
 from service.estimator.controls import Controls
@@ -29,25 +30,34 @@ class Place(NamedTuple):
     frame: LocalFrame | None
     down: float
     controls: Controls
+    motion: Motion[Any, Any] | None = None
 
 
 class Surroundings(NamedTuple):
     """What is known of the place: beacons, and the landmarks' north and east (metres), by their number.
 
-    ``height`` names the state that is the vehicle's down, if it is one.
+    ``height`` names the state that is the vehicle's down, if it is one; ``rolls`` tells a vehicle whose speed is a
+    control from one whose velocity is a state. ``speed_noise`` (m/√s) is the control's, ``wheel_radius`` in metres.
     """
 
     beacons: dict[int, Beacon]
     landmarks: dict[int, tuple[float, float]]
     height: str | None = None
+    rolls: bool = True
+    speed_noise: float = 0.0
+    wheel_radius: float | None = None
 
 
 class Bound(Protocol):
-    """One ``[[sensor]]`` of the configuration, as its kind sees it."""
+    """One ``[[sensor]]`` of the configuration, as its kind sees it.
+
+    ``memory`` is what the kind remembers of the one who says the reading at hand.
+    """
 
     settings: Sensor
     surroundings: Surroundings
     model: SensorModel[Any]
+    memory: Any
 
     def sigma(self, claimed: float | None) -> float:
         """Return the larger of what the configuration and the reading say; each knows of errors the other does not."""
@@ -87,6 +97,14 @@ class Kind:
         Which of the readings are taken, given the settings.
     suffix : callable
         What tells one reading's origin from another's in the record: the beacon.
+    label : callable
+        What tells two sensors of the kind apart that have one link.
+    part : callable
+        Which part of a reading a sensor takes where several may have one each: the wheel; ``None``: all of it.
+    memory : callable
+        Makes what is remembered of each speaker, if anything is.
+    alone : bool
+        Whether only one speaker is heard at a time, because each has errors of its own that last.
     """
 
     readings: tuple[type, ...]
@@ -100,6 +118,10 @@ class Kind:
     shifted: bool = False
     wants: Callable[[Sensor, Any], bool] = lambda settings, reading: True
     suffix: Callable[[Any], str] = lambda reading: ""
+    label: Callable[[Sensor], str] = lambda settings: ""
+    part: Callable[[Sensor], int | None] = lambda settings: None
+    memory: Callable[[Sensor, Surroundings], Any] | None = None
+    alone: bool = False
 
     def log_outlier_density(self, settings: Sensor) -> float:
         """Return the logarithm of the outlier part's density in the reading's own space.
@@ -128,6 +150,10 @@ class Measurement(NamedTuple):
         How many readings share one independent error; the sigma of ``value`` has it already.
     lasting : float
         Variance of the part of the error that lasts from reading to reading for about a minute, m²; 0: none.
+    independent : bool
+        Whether its errors are said to be independent of each other.
+    timing : float
+        How well the latency is known that was taken off its stamp, seconds: all its readings share that error.
     """
 
     name: str
@@ -137,6 +163,8 @@ class Measurement(NamedTuple):
     log_outlier: float
     repeats: float
     lasting: float = 0.0
+    independent: bool = False
+    timing: float = 0.0
 
     def surprise(self, log_mean: float) -> float:
         """Return the probability, 0…1, that the reading is the outlier part's, given its evidence."""

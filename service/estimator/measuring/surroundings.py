@@ -11,7 +11,7 @@ from service.estimator.measuring.kind import Surroundings
 
 
 def surroundings_of(configuration: Configuration) -> Surroundings:
-    """Return the beacons of a configuration, and the landmarks of its map.
+    """Return the beacons of a configuration, the landmarks of its map, and how its vehicle moves.
 
     Raises
     ------
@@ -23,4 +23,7 @@ def surroundings_of(configuration: Configuration) -> Surroundings:
         {beacon.id: beacon for beacon in configuration.beacon},
         landmarks.read(Path(path)) if path else {},
         height_state(configuration),
+        configuration.vehicle.motion != "constant_velocity",
+        configuration.motion.speed_noise,
+        configuration.motion.wheel_radius,
     )

@@ -66,7 +66,7 @@ def placed(raw: dict[str, Any], place: str, value: object) -> dict[str, Any]:
 
 
 DELETE = object()
-SINGLE = [
+SINGLE: list[tuple[str, object, str]] = [
     ("beacon.0.position", [1.0, 2.0], "beacon 7, position: needs 3 numbers (north, east, down), got 2"),
     ("beacon.0.position", "here", 'beacon 7, position: needs 3 numbers (north, east, down), got "here"'),
     ("beacon.0.position", [1, "a", 2], 'beacon 7, position, number 2: needs a number, got "a"'),
@@ -179,12 +179,23 @@ SINGLE = [
     (
         "sensor",
         [{"kind": "position", "estimate": ["bias"]}],
-        'sensor 1 (position), estimate: bias is estimated for ranges only, and this is "position"',
+        "sensor 1 (position), estimate: bias is estimated for ranges, speeds and altitudes only, and this",
     ),
     (
         "sensor",
         [{"kind": "range", "estimate": ["scale"]}, {"kind": "range", "estimate": ["bias", "scale"]}],
         'sensor 2 (range), estimate: "scale" is estimated with sensor 1; there is one of all ranges',
+    ),
+    (
+        "sensor",
+        [{"kind": "heading", "lever": [0.0, 0.5]}],
+        'sensor 1 (heading), lever: belongs to kind = "speed", and this is "heading"',
+    ),
+    ("sensor", [{"kind": "speed", "lever": [0.5]}], "lever: needs 2 numbers (forward, right), got 1"),
+    (
+        "motion",
+        {"speed_from": "sensors"},
+        'motion, speed_from: "sensors" needs at least one [[sensor]] of kind = "speed"',
     ),
     ("moton", {}, 'moton: unknown key; did you mean "motion"?'),
     ("xyzzy", 1, "xyzzy: unknown key"),
