@@ -22,6 +22,7 @@ from filters.linearised.bearing import LinearisedBearing
 from filters.linearised.biased_range import LinearisedBiasedRange
 from filters.linearised.constant_velocity import LinearisedConstantVelocity
 from filters.linearised.down import LinearisedDown
+from filters.linearised.free_velocity import LinearisedFreeVelocity
 from filters.linearised.heading import LinearisedHeading
 from filters.linearised.position import LinearisedPosition
 from filters.linearised.range import LinearisedRange
@@ -37,6 +38,7 @@ from filters.sensing import Bearing, Heading, Position, Range, RangeBearing, Sen
 from filters.sensing.altitude import Altitude
 from filters.sensing.biased_range import BiasedRange
 from filters.sensing.down import Down
+from filters.sensing.free_velocity import FreeVelocity
 from filters.sensing.speed import GroundSpeed, WheelSpeed
 
 LINEARISED: Mapping[type, Callable[[Any], LinearisedSensor[Any]]] = MappingProxyType(
@@ -46,6 +48,7 @@ LINEARISED: Mapping[type, Callable[[Any], LinearisedSensor[Any]]] = MappingProxy
         BiasedRange: LinearisedBiasedRange,
         Down: LinearisedDown,
         GroundSpeed: LinearisedGroundSpeed,
+        FreeVelocity: LinearisedFreeVelocity,
         Heading: LinearisedHeading,
         Position: LinearisedPosition,
         Range: LinearisedRange,

@@ -71,7 +71,7 @@ _ODOMETRY = frozenset({Odometer, Speed, MotionCommand})
 """What tells how far the vehicle went; without any of it a motion model with a heading has nothing to go by, and a
 receiver's delay does not show."""
 
-_POINTING = frozenset({"velocity", "heading", "bearing", "range_bearing"})
+_POINTING = frozenset({"heading", "bearing", "range_bearing"})
 """Kinds that speak of a heading, which a tag has not."""
 
 SHORTEST_HORIZON_MS = 50.0
