@@ -93,8 +93,7 @@ def product(
     def step(tick: Tick) -> tuple[float, float, float]:
         before = clock()
         belief.predict(tick.control, DURATION)
-        for measurement in tick.ranges:
-            belief.weigh(sensor, measurement)
+        belief.weigh_all(sensor, tick.ranges)
         belief.normalize()
         moments = belief.moments()
         if belief.effective_sample_size < 0.5 * count:

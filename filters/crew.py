@@ -7,6 +7,7 @@ random numbers from counters, and adds the blocks' sums in order; so a crew make
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -66,6 +67,8 @@ class Blocks:
         Block b lies from ``bounds[b]`` to ``bounds[b + 1]``.
     pairs : list of (int, int)
         The same as plain numbers.
+    pieces : list of list of (int, int)
+        Of the blocks and parts of blocks that each thread moves, all of nearly one size.
     """
 
     def __init__(self, largest: int, crew: Crew | None = None) -> None:
@@ -73,7 +76,12 @@ class Blocks:
         self._crew = crew
         self.bounds: NDArray[np.int64] = np.zeros(1, np.int64)
         self.pairs: list[tuple[int, int]] = []
+        self.pieces: list[list[tuple[int, int]]] = []
         self.shared = False
+
+    def most(self, capacity: int) -> int:
+        """How many blocks there can be of that many particles."""
+        return len(block_sizes(capacity, self._largest))
 
     def divide(self, count: int) -> None:
         """Divide ``count`` particles."""
@@ -83,6 +91,26 @@ class Blocks:
         self.shared = self._crew is not None and count >= max(
             self._crew.fewest, self._crew.threads * ALIGNMENT
         )
+        self.pieces = self._divided(count) if self.shared else []
+
+    def _divided(self, count: int) -> list[list[tuple[int, int]]]:
+        """Divide the blocks among the threads, cutting them at multiples of the alignment from their beginnings."""
+        threads = self.threads
+        pieces: list[list[tuple[int, int]]] = [[] for _ in range(threads)]
+        for first, last in self.pairs:
+            cuts = [first]
+            for part in range(1, threads):
+                wanted = count * part // threads - first
+                cuts.append(min(max(first + wanted // ALIGNMENT * ALIGNMENT, cuts[-1]), last))
+            for part, (start, end) in enumerate(pairwise([*cuts, last])):
+                if start < end:
+                    pieces[part].append((start, end))
+        return pieces
+
+    def share_pieces(self, task: Callable[[int], None]) -> None:
+        """Call ``task(part)`` for every thread, which works on its :attr:`pieces`."""
+        assert self._crew is not None
+        self._crew.run(task)
 
     @property
     def number(self) -> int:

@@ -44,9 +44,7 @@ class MomentSums:
         size = len(particles.names)
         self._sums = np.zeros((most_blocks, kernels.SUMS + 2 * (size - _POSE)))
         self._reference = np.zeros(kernels.REFERENCE)
-        self._displace = kernels.displace_reference.direct
-        self._sum_blocks = kernels.sum_blocks.direct
-        self._finish = kernels.finish.direct
+        self._summarize = kernels.summarize.direct
 
     def moments(
         self,
@@ -60,37 +58,42 @@ class MomentSums:
         The blocks are summed over in float32; ``given_path`` is what each marginalised column's variance is beyond
         the spread of its means.
         """
-        size = len(self._particles.names)
-        out = np.empty(2 * size + _POSE * _POSE)
-        self._sum(shift, blocks, out)
-        variance = out[size : 2 * size]
+        names = self._particles.names
+        mean, variance, covariance = np.empty(len(names)), np.empty(len(names)), np.empty((_POSE, _POSE))
+        if blocks.shared:
+            self._share(shift, blocks, mean, variance, covariance)
+        else:
+            self._summarize(
+                self._particles.columns,
+                self._weights,
+                blocks.bounds,
+                *shift,
+                self._centre,
+                self._reference,
+                self._sums,
+                mean,
+                variance,
+                covariance,
+            )
         for name, extra in given_path.items():
             if extra > 0.0:
                 variance[self._particles.rows[name]] += extra
-        covariance = out[2 * size :].reshape(_POSE, _POSE)
         # as the constructor makes it, without its call in Python
-        return tuple.__new__(
-            Moments, (self._particles.names, out[:size], covariance, variance, effective_sample_size)
-        )
+        return tuple.__new__(Moments, (names, mean, covariance, variance, effective_sample_size))
 
-    def _sum(self, shift: Displacement, blocks: Blocks, out: kernels.Float64Array) -> None:
-        """Write the moments to ``out``.
-
-        One thread calls the same kernel as several: within another kernel a compiler may sum in another order.
-        """
+    def _share(self, shift: Displacement, blocks: Blocks, *out: kernels.Float64Array) -> None:
+        """Write the moments with the crew: what ``summarize`` does alone."""
         forward, right, turn = shift
         centre, reference, sums = self._centre, self._reference, self._sums
         columns, weights, bounds = self._particles.columns, self._weights, blocks.bounds
 
         def add(part: int, first: int, last: int) -> None:
-            sum_blocks(columns, weights, bounds, first, last, forward, right, centre, reference, sums)
+            kernels.sum_blocks.direct(
+                columns, weights, bounds, first, last, forward, right, centre, reference, sums
+            )
 
-        sum_blocks, number = self._sum_blocks, blocks.number
-        self._displace(centre, forward, right, turn, reference)
+        kernels.displace_reference.direct(centre, forward, right, turn, reference)
         done = False
         while not done:
-            if blocks.shared:
-                blocks.share(add)
-            else:
-                sum_blocks(columns, weights, bounds, 0, number, forward, right, centre, reference, sums)
-            done = self._finish(number, forward, right, centre, reference, sums, out)
+            blocks.share(add)
+            done = kernels.finish.direct(blocks.number, forward, right, centre, reference, sums, *out)

@@ -157,7 +157,10 @@ def sum_blocks(
         sum_slow(columns, weights, first, last, centre, sums[block])
 
 
-@kernel("boolean(int64, float64, float64, float32[:, ::1], float64[::1], float64[:, ::1], float64[::1])")
+@kernel(
+    "boolean(int64, float64, float64, float32[:, ::1], float64[::1], float64[:, ::1], float64[::1], float64[::1],"
+    "float64[:, ::1])"
+)
 def finish(
     blocks: int,
     forward: float,
@@ -165,11 +168,13 @@ def finish(
     centre: Float32Array,
     reference: Float64Array,
     sums: Float64Array,
-    out: Float64Array,
+    mean: Float64Array,
+    variance: Float64Array,
+    covariance: Float64Array,
 ) -> bool:
     """Make moments of the sums and move the centre to the mean; false if they must be taken anew.
 
-    ``out`` is the mean, the variance of each dimension, and the pose's covariance in nine numbers. Anew, about the
+    The mean and the variance of each dimension, and the pose's covariance. Anew, about the
     reference that is set then: when some particle's heading wraps elsewhere about the mean than about the reference,
     and when the belief has jumped, so that no digits are left for its spread.
     """
@@ -199,28 +204,53 @@ def finish(
         reference[2] = heading
         reference[4] = 2.0
         return False
-    size = centre.shape[0]
     nn, ee = max(nn, 0.0), max(ee, 0.0)
     hh = max(total[11] / weight - 2.0 * offset * h + offset * offset, 0.0)
     ne = total[7] / weight - n * e
     ne = math.copysign(min(abs(ne), math.sqrt(nn * ee)), ne)  # rounding: few particles lie on a line
     nh, eh = total[9] / weight - n * h, total[10] / weight - e * h
     mean_heading = reference[2] + offset
-    out[0] = reference[0] + n
-    out[1] = reference[1] + e
-    out[2] = principal(mean_heading)
+    mean[0] = reference[0] + n
+    mean[1] = reference[1] + e
+    mean[2] = principal(mean_heading)
     centre[0, 0] += n
     centre[1, 0] += e
     centre[2, 0] = principal(mean_heading - turn)
-    out[size], out[size + 1], out[size + 2] = nn, ee, hh
-    for row in range(POSE, size):
+    variance[0], variance[1], variance[2] = nn, ee, hh
+    for row in range(POSE, centre.shape[0]):
         away = total[SUMS + 2 * (row - POSE)] / weight
         square = total[SUMS + 2 * (row - POSE) + 1] / weight
-        out[row] = centre[row, 0] + away
-        centre[row, 0] = out[row]
-        out[size + row] = max(square - away * away, 0.0)
-    place = 2 * size
-    out[place], out[place + 1], out[place + 2] = nn, ne, nh
-    out[place + 3], out[place + 4], out[place + 5] = ne, ee, eh
-    out[place + 6], out[place + 7], out[place + 8] = nh, eh, hh
+        mean[row] = centre[row, 0] + away
+        centre[row, 0] = mean[row]
+        variance[row] = max(square - away * away, 0.0)
+    covariance[0, 0], covariance[0, 1], covariance[0, 2] = nn, ne, nh
+    covariance[1, 0], covariance[1, 1], covariance[1, 2] = ne, ee, eh
+    covariance[2, 0], covariance[2, 1], covariance[2, 2] = nh, eh, hh
     return True
+
+
+@kernel(
+    "void(float32[:, ::1], float32[::1], int64[::1], float64, float64, float64, float32[:, ::1], float64[::1],"
+    "float64[:, ::1], float64[::1], float64[::1], float64[:, ::1])"
+)
+def summarize(
+    columns: Float32Array,
+    weights: Float32Array,
+    bounds: Int64Array,
+    forward: float,
+    right: float,
+    turn: float,
+    centre: Float32Array,
+    reference: Float64Array,
+    sums: Float64Array,
+    mean: Float64Array,
+    variance: Float64Array,
+    covariance: Float64Array,
+) -> None:
+    """All of it in one call, for one thread: the reference, the blocks' sums, and their moments."""
+    blocks = bounds.size - 1
+    displace_reference(centre, forward, right, turn, reference)
+    done = False
+    while not done:
+        sum_blocks(columns, weights, bounds, 0, blocks, forward, right, centre, reference, sums)
+        done = finish(blocks, forward, right, centre, reference, sums, mean, variance, covariance)

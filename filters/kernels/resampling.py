@@ -129,9 +129,12 @@ def redraw(
 def block_sizes(count: int, largest: int) -> list[int]:
     """Sizes of as few blocks as possible, none larger than ``largest`` by a run or more, all of nearly one size.
 
-    ``deal`` gives run r to block r modulo the number of blocks, so the sizes follow from it.
+    Their number is one or even, so that two threads have as many each. ``deal`` gives run r to block r modulo the
+    number of blocks, so the sizes follow from it.
     """
     number = -(-count // largest)
+    if number > 1:
+        number += number % 2
     runs, rest = divmod(-(-count // RUN), number)
     sizes = [RUN * (runs + (block < rest)) for block in range(number)]
     sizes[rest - 1] -= -count % RUN  # the last run of all may be short

@@ -77,21 +77,20 @@ def add(sums: Float64Array, blocks: int) -> tuple[float, float]:
     return total, squares
 
 
+@kernel("UniTuple(float64, 3)(float32[::1], float32[::1], int64[::1], float64[:, ::1])")
 def normalize(
     log_weights: Float32Array, weights: Float32Array, bounds: Int64Array, sums: Float64Array
 ) -> tuple[float, float, float]:
-    """Exponentiate all blocks less the largest log weight; nothing is done if all are nothing.
-
-    No kernel itself: in one, the compiler might sum in another order than for several threads.
+    """Exponentiate all blocks less the largest log weight, for one thread; nothing is done if all are nothing.
 
     Returns the largest log weight, the sum of the weights and that of their squares.
     """
     blocks = bounds.size - 1
-    top = peak.direct(log_weights, 0, bounds[blocks])
+    top = peak(log_weights, 0, bounds[blocks])
     if not NOTHING < top < np.inf:
         return top, 0.0, 0.0
-    exponentiate.direct(log_weights, weights, bounds, 0, blocks, top, sums)
-    total, squares = add.direct(sums, blocks)
+    exponentiate(log_weights, weights, bounds, 0, blocks, top, sums)
+    total, squares = add(sums, blocks)
     return top, total, squares
 
 

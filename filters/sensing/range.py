@@ -9,14 +9,16 @@ outlier part, as the range part of the beam and landmark models of chapter 6 of 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from numpy import float32
 
-from filters.kernels.compile import Float32Array, kernel
-from filters.kernels.elementary import log_mixture
+from filters.kernels.compile import Float32Array, function, kernel
+from filters.kernels.elementary import Real, log_mixture
+from filters.kernels.evidence import CHUNK, thin
 from filters.particle_set import ParticleSet
+from filters.sensing.model import Account, Float64Array
 from filters.sensing.robust import check, mixture, sigma_refusal
 
 _LOG_SQRT_TWO_PI = 0.5 * math.log(2.0 * math.pi)
@@ -86,6 +88,7 @@ class Range:
         self.scale = scale
         self.bias = bias
         self._plain = outliers == 0.0 and scale is None and bias is None
+        self._own = self._constants(sigma)
 
     def refusal(self, measurement: RangeMeasurement) -> str | None:
         """Refuse a distance not positive or longer than ``longest``, and a sigma that is not positive."""
@@ -127,6 +130,36 @@ class Range:
         )
         return mixed.log_peak
 
+    def tabulate(self, measurements: Sequence[RangeMeasurement]) -> list[float] | None:
+        """Prepare several ranges for one call; see :class:`filters.sensing.model.Batch`."""
+        longest, own = self.longest, self._own
+        numbers: list[float] = []
+        for distance, north, east, down, sigma in measurements:
+            if not 0.0 < distance <= longest or (sigma is not None and not sigma > 0.0):
+                return None
+            numbers += (distance, north, east, down)
+            numbers += own if sigma is None else self._constants(sigma)
+        return numbers
+
+    def weigh_all(
+        self, particles: ParticleSet, first: int, last: int, numbers: Float64Array, account: Account
+    ) -> None:
+        """Add the log likelihoods of several ranges in turn; see :class:`filters.sensing.model.Batch`."""
+        columns, log_weights = particles.columns, particles.log_weights
+        if self._plain:
+            gaussian_all.direct(columns, log_weights, first, last, numbers, *account)
+            return
+        scale_row, scale_slope = (0, 0.0) if self.scale is None else (particles.row(self.scale), 1.0)
+        bias_row, bias_slope = (0, 0.0) if self.bias is None else (particles.row(self.bias), 1.0)
+        slow = (scale_row, scale_slope, bias_row, bias_slope)
+        robust_all.direct(columns, log_weights, first, last, numbers, *account, *slow)
+
+    def _constants(self, sigma: float) -> tuple[float, float, float, float]:
+        """Return what the kernels want to know of a standard deviation: the gain, and the three of the mixture."""
+        log_density = -math.log(sigma) - _LOG_SQRT_TWO_PI
+        mixed = mixture(self.outliers, log_density, -math.log(self.span))
+        return _ROOT_HALF / sigma, mixed.log_inlier, mixed.log_outlier, mixed.log_peak
+
     def innovation(self, centre: Mapping[str, float], measurement: RangeMeasurement) -> float:
         """Measured less expected distance at the centre, metres."""
         distance, north, east, down, _ = measurement
@@ -144,11 +177,11 @@ def gaussian(
     log_weights: Float32Array,
     first: int,
     last: int,
-    beacon_north: float,
-    beacon_east: float,
-    down_square: float,
-    distance: float,
-    gain: float,
+    beacon_north: Real,
+    beacon_east: Real,
+    down_square: Real,
+    distance: Real,
+    gain: Real,
 ) -> None:
     """Take the squared, scaled residual off each log weight."""
     north = columns[0, first:last]
@@ -170,13 +203,13 @@ def robust(
     log_weights: Float32Array,
     first: int,
     last: int,
-    beacon_north: float,
-    beacon_east: float,
-    down_square: float,
-    distance: float,
-    gain: float,
-    log_inlier: float,
-    log_outlier: float,
+    beacon_north: Real,
+    beacon_east: Real,
+    down_square: Real,
+    distance: Real,
+    gain: Real,
+    log_inlier: Real,
+    log_outlier: Real,
     scale_row: int,
     scale_slope: float,
     bias_row: int,
@@ -197,3 +230,98 @@ def robust(
         )
         q = float32(gain * float32(distance - expected))
         log_weight[i] += log_mixture(float32(q * q), log_inlier, log_outlier)
+
+
+@function
+def away(centre: Float32Array, numbers: Float64Array) -> float:
+    """Distance of a beacon from the centre."""
+    north = centre[0, 0] - numbers[1]
+    east = centre[1, 0] - numbers[2]
+    return math.sqrt(north * north + east * east + numbers[3] * numbers[3])
+
+
+@kernel(
+    "void(float32[:, ::1], float32[::1], int64, int64, float64[:, ::1], int64, float32[:, ::1], int64,"
+    "float32[:, ::1], float64[:, ::1])"
+)
+def gaussian_all(
+    columns: Float32Array,
+    log_weights: Float32Array,
+    first: int,
+    last: int,
+    numbers: Float64Array,
+    rows: int,
+    centre: Float32Array,
+    stride: int,
+    samples: Float32Array,
+    said: Float64Array,
+) -> None:
+    """Do what :func:`gaussian` does for several ranges, a row of numbers each, and keep a sample after every one."""
+    for start in range(first, last, CHUNK):
+        end = min(start + CHUNK, last)
+        for k in range(rows):
+            n = numbers[k]
+            gaussian(
+                columns,
+                log_weights,
+                start,
+                end,
+                float32(n[1]),
+                float32(n[2]),
+                float32(n[3] * n[3]),
+                float32(n[0]),
+                float32(n[4]),
+            )
+            thin(log_weights, start, end, stride, samples[k])
+    for k in range(rows):
+        said[k, 0] = numbers[k, 7]
+        said[k, 1] = numbers[k, 0] - away(centre, numbers[k])
+
+
+@kernel(
+    "void(float32[:, ::1], float32[::1], int64, int64, float64[:, ::1], int64, float32[:, ::1], int64,"
+    "float32[:, ::1], float64[:, ::1], int64, float32, int64, float32)"
+)
+def robust_all(
+    columns: Float32Array,
+    log_weights: Float32Array,
+    first: int,
+    last: int,
+    numbers: Float64Array,
+    rows: int,
+    centre: Float32Array,
+    stride: int,
+    samples: Float32Array,
+    said: Float64Array,
+    scale_row: int,
+    scale_slope: float,
+    bias_row: int,
+    bias_slope: float,
+) -> None:
+    """Do what :func:`robust` does for several ranges, a row of numbers each, and keep a sample after every one."""
+    for start in range(first, last, CHUNK):
+        end = min(start + CHUNK, last)
+        for k in range(rows):
+            n = numbers[k]
+            robust(
+                columns,
+                log_weights,
+                start,
+                end,
+                float32(n[1]),
+                float32(n[2]),
+                float32(n[3] * n[3]),
+                float32(n[0]),
+                float32(n[4]),
+                float32(n[5]),
+                float32(n[6]),
+                scale_row,
+                scale_slope,
+                bias_row,
+                bias_slope,
+            )
+            thin(log_weights, start, end, stride, samples[k])
+    factor = scale_slope * centre[scale_row, 0] + (1.0 - scale_slope)
+    for k in range(rows):
+        said[k, 0] = numbers[k, 7]
+        said[k, 1] = numbers[k, 0] - factor * away(centre, numbers[k]) - bias_slope * centre[bias_row, 0]

@@ -25,6 +25,8 @@ from filters.sensing import (
     VelocityMeasurement,
 )
 
+TWO_RANGES = (RangeMeasurement(4.9, 3.0, 4.0), RangeMeasurement(5.2, -4.0, 3.0))
+
 
 class Backwards:
     """A crew whose last member is always the first."""
@@ -60,6 +62,8 @@ def history(crew: Backwards | None, counts: tuple[int, ...], block: int) -> byte
             belief.weigh(Position(2.0), PositionMeasurement(0.1, 0.1)),
             belief.weigh(Velocity(1.0), VelocityMeasurement(0.5, 0.1, 0.5)),
             belief.weigh(Heading(0.5), HeadingMeasurement(0.3)),
+            *belief.weigh_all(Range(0.4, outliers=0.0), TWO_RANGES),
+            *belief.weigh_all(Range(0.4, bias="range_bias"), TWO_RANGES),
         ]
         moments = belief.moments(Displacement(0.1, 0.0, 0.02))
         said += [np.array(evidence).tobytes(), moments.mean.tobytes(), moments.pose_covariance.tobytes()]
@@ -110,3 +114,22 @@ def test_parts_follow_on_each_other(count: int, threads: int, grain: int, larges
         assert start % grain == 0
     assert blocks.pairs[-1][1] == count
     assert len(blocks.pairs) == blocks.number
+
+
+@given(st.integers(1, 5000), st.integers(1, 6), st.integers(50, 900))
+@settings(deadline=None)
+def test_pieces_are_the_blocks_cut_where_no_vector_is(count: int, threads: int, largest: int) -> None:
+    """Together they are the particles in order; each begins a multiple of the alignment into its block."""
+    blocks = Blocks(largest, Backwards(threads))
+    blocks.divide(count)
+    if not blocks.shared:
+        assert blocks.pieces == []
+        return
+    assert len(blocks.pieces) == threads
+    everything = sorted(piece for part in blocks.pieces for piece in part)
+    assert [start for start, _ in everything] == [0, *(end for _, end in everything[:-1])]
+    assert everything[-1][1] == count
+    for start, end in everything:
+        first, last = next((a, b) for a, b in blocks.pairs if a <= start < b)
+        assert end <= last
+        assert (start - first) % ALIGNMENT == 0

@@ -58,7 +58,8 @@ def test_moments_from_any_reference(turn: float, heading: float, far: float) -> 
     columns = np.ascontiguousarray(columns, np.float32)
     w = rng.exponential(size=count).astype(np.float32)
     centre = np.zeros((4, 1), np.float32)
-    out = np.zeros(2 * 4 + 9)
+    found, variance, covariance = np.zeros(4), np.zeros(4), np.zeros((3, 3))
+    given = found, variance, covariance
     bounds = np.linspace(0, count, blocks + 1).astype(np.int64)
     sums = np.zeros((blocks, moments.SUMS + 2))
     for _ in range(2):  # the second time from the centre that the first has found
@@ -67,7 +68,7 @@ def test_moments_from_any_reference(turn: float, heading: float, far: float) -> 
         done = False
         while not done:
             moments.sum_blocks(columns, w, bounds, 0, blocks, 2.0, -1.0, centre, reference, sums)
-            done = moments.finish(blocks, 2.0, -1.0, centre, reference, sums, out)
+            done = moments.finish(blocks, 2.0, -1.0, centre, reference, sums, *given)
         n, e, h, slow = columns.astype(np.float64)
         north = n + 2.0 * np.cos(h) + np.sin(h)
         east = e + 2.0 * np.sin(h) - np.cos(h)
@@ -75,8 +76,34 @@ def test_moments_from_any_reference(turn: float, heading: float, far: float) -> 
         mean = np.arctan2(p @ np.sin(h + turn), p @ np.cos(h + turn))
         turned = (h + turn - mean + np.pi) % (2 * np.pi) - np.pi
         offsets = np.stack([north - p @ north, east - p @ east, turned])
-        np.testing.assert_allclose(out[:2], [p @ north, p @ east], atol=5e-4)
-        assert (out[2] - mean + np.pi) % (2 * np.pi) - np.pi == pytest.approx(0.0, abs=1e-5)
-        assert out[3] == pytest.approx(p @ slow, abs=1e-5)
-        np.testing.assert_allclose(out[8:].reshape(3, 3), (offsets * p) @ offsets.T, atol=3e-4)
-        assert out[7] == pytest.approx(p @ slow**2 - (p @ slow) ** 2, rel=1e-4)
+        np.testing.assert_allclose(found[:2], [p @ north, p @ east], atol=5e-4)
+        assert (found[2] - mean + np.pi) % (2 * np.pi) - np.pi == pytest.approx(0.0, abs=1e-5)
+        assert found[3] == pytest.approx(p @ slow, abs=1e-5)
+        np.testing.assert_allclose(covariance, (offsets * p) @ offsets.T, atol=3e-4)
+        assert variance[3] == pytest.approx(p @ slow**2 - (p @ slow) ** 2, rel=1e-4)
+
+
+def test_one_call_is_the_same_as_its_parts() -> None:
+    """To the bit, at a heading that wraps: the sums are taken anew. A crew calls the parts, one thread the whole."""
+    rng = np.random.default_rng(8)
+    columns = np.ascontiguousarray(rng.normal([[9.0], [5.0], [3.1], [1.0]], 0.4, (4, 2000)), np.float32)
+    w = rng.exponential(size=2000).astype(np.float32)
+    bounds = np.array([0, 700, 1403, 2000])
+    said: list[bytes] = []
+    for whole in (True, False):
+        centre, reference = np.zeros((4, 1), np.float32), np.zeros(moments.REFERENCE)
+        sums = np.zeros((3, moments.SUMS + 2))
+        given = np.zeros(4), np.zeros(4), np.zeros((3, 3))
+        if whole:
+            moments.summarize(columns, w, bounds, 2.0, -1.0, 0.1, centre, reference, sums, *given)
+        else:
+            moments.displace_reference(centre, 2.0, -1.0, 0.1, reference)
+            done = False
+            while not done:
+                for block in range(3):
+                    moments.sum_blocks(
+                        columns, w, bounds, block, block + 1, 2.0, -1.0, centre, reference, sums
+                    )
+                done = moments.finish(3, 2.0, -1.0, centre, reference, sums, *given)
+        said.append(b"".join(array.tobytes() for array in (*given, centre)))
+    assert said[0] == said[1]
