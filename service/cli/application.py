@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli import bench, check, demo, listen, replay, run, scenario, sim, textbook, unit, warm
+from service.cli import bench, check, demo, listen, replay, run, scenario, send, sim, textbook, unit, warm
 
 _HELP = """
 A belief daemon: where a vehicle is when satellite navigation is gone, on time and honest about it.
@@ -57,7 +57,7 @@ def options(
     """Take the options that stand before every command."""
 
 
-_COMMANDS = (demo, run, check, sim, listen, replay, scenario, textbook, bench, warm)
+_COMMANDS = (demo, run, check, sim, listen, send, replay, scenario, textbook, bench, warm)
 for _module in _COMMANDS:
     application.command(
         _module.NAME,

@@ -42,7 +42,7 @@ def configuration(tmp_path: Path) -> Path:
     return path
 
 
-COMMANDS = ["demo", "run", "check", "sim", "listen", "replay", "scenario", "textbook", "service"]
+COMMANDS = ["demo", "run", "check", "sim", "listen", "send", "replay", "scenario", "textbook", "service"]
 
 
 def test_help_names_every_command_and_hides_what_is_not_for_users() -> None:
