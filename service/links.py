@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from drivers.can import CanSettings
     from drivers.mavlink import MavlinkSettings
 
-HUD_RATE = 10.0  # Hz: what is wanted of VFR_HUD has to be asked for, like the rest
+HUD_RATE = (
+    10.0  # Hz: what is wanted of VFR_HUD and the autopilot's altitudes has to be asked for, like the rest
+)
 
 
 def link_named(configuration: Configuration, name: str) -> Link:
@@ -48,16 +50,18 @@ def mavlink_settings(link: MavlinkLink) -> MavlinkSettings:
     """Return the driver's settings of a MAVLink link; a log of it is read with the same."""
     from drivers.mavlink import DEFAULT_RATES, MavlinkSettings, ServoCalibration
 
+    asked = ["VFR_HUD"] if link.hud else []
     return MavlinkSettings(
         url=link.url,
         system=link.system,
         components=frozenset(link.components) or None,
-        rates=DEFAULT_RATES | ({"VFR_HUD": HUD_RATE} if link.hud else {}) | link.rates,
+        rates=DEFAULT_RATES | dict.fromkeys([*asked, *link.altitudes], HUD_RATE) | link.rates,
         servos=tuple(
             ServoCalibration(servo.channel, servo.low, servo.trim, servo.high, servo.reversed)
             for servo in link.servo
         ),
         hud=frozenset(link.hud),
+        altitudes=frozenset(link.altitudes),
         geoid_height=link.geoid_height,
         signing_key_file=link.signing_key_file,
     )

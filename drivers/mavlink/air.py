@@ -1,4 +1,7 @@
-"""Air data: SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, and what may be taken from VFR_HUD."""
+"""Air data: SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, and what may be taken from VFR_HUD and the autopilot.
+
+How high the autopilot thinks it is, it has from barometer and GNSS by a filter of its own: no sensor, so only if asked.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from drivers.mavlink.moment import Moment, Timed
 from drivers.sample import Altitude, Heading, Pressure, Speed
 
 CENTIKELVIN = 0.01
+MILLIMETRE = 1e-3
 
 
 def scaled_pressure(fields: Any, at: Moment) -> list[Timed]:
@@ -21,6 +25,22 @@ def scaled_pressure(fields: Any, at: Moment) -> list[Timed]:
     temperature = fields.temperature * CENTIKELVIN + KELVIN
     reading = Pressure(fields.press_abs * HECTOPASCAL, differential, temperature)
     return [(at.boot_ms(fields.time_boot_ms), reading)]
+
+
+def altitude(fields: Any, at: Moment) -> list[Timed]:
+    """ALTITUDE 141: the one above mean sea level; NaN, and from PX4 without GNSS, is not known."""
+    if not math.isfinite(fields.altitude_amsl):
+        at.pass_over("altitude_amsl")
+        return []
+    return [(at.microseconds(fields.time_usec), Altitude(fields.altitude_amsl))]
+
+
+def global_position(fields: Any, at: Moment) -> list[Timed]:
+    """GLOBAL_POSITION_INT 33: the altitude alone; without a position it reads 0, 0, and its altitude is nothing."""
+    if fields.lat == 0 and fields.lon == 0:
+        at.pass_over("lat")
+        return []
+    return [(at.boot_ms(fields.time_boot_ms), Altitude(fields.alt * MILLIMETRE))]
 
 
 class Hud:

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable
 
 from drivers.clock import DeviceClocks
-from drivers.mavlink.air import Hud, scaled_pressure
+from drivers.mavlink.air import Hud, altitude, global_position, scaled_pressure
 from drivers.mavlink.control import Servos, heartbeat, position_target
 from drivers.mavlink.dialect import IDENTIFIERS, Message
 from drivers.mavlink.gnss import Receiver, global_origin
@@ -57,6 +57,10 @@ def handlers_of(settings: MavlinkSettings) -> dict[str, Callable[[], Handler]]:
         handlers["SERVO_OUTPUT_RAW"] = lambda: Servos(settings.servos)
     if settings.hud:
         handlers["VFR_HUD"] = lambda: Hud(settings.hud)
+    if "ALTITUDE" in settings.altitudes:
+        handlers["ALTITUDE"] = lambda: altitude
+    if "GLOBAL_POSITION_INT" in settings.altitudes:
+        handlers["GLOBAL_POSITION_INT"] = lambda: global_position
     return handlers
 
 

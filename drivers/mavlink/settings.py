@@ -71,6 +71,8 @@ class MavlinkSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
         Without any, SERVO_OUTPUT_RAW is not used.
     hud : frozenset
         What to take from VFR_HUD. Empty by default: it repeats what GNSS and the autopilot's filter said.
+    altitudes : frozenset
+        Messages whose altitude is taken: what the autopilot's filter made of its barometer and GNSS. Empty by default.
     geoid_height : float or None
         Metres of the geoid (mean sea level) above the WGS 84 ellipsoid here; without it the altitude of a
         beacon that is given above the ellipsoid stays unknown.
@@ -86,6 +88,7 @@ class MavlinkSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     rates: dict[str, float] = msgspec.field(default_factory=lambda: dict(DEFAULT_RATES))
     servos: tuple[ServoCalibration, ...] = ()
     hud: frozenset[Literal["groundspeed", "altitude", "heading"]] = frozenset()
+    altitudes: frozenset[Literal["ALTITUDE", "GLOBAL_POSITION_INT"]] = frozenset()
     geoid_height: float | None = None
     own_component: int = ONBOARD_COMPONENT
     signing_key_file: str = ""

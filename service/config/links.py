@@ -75,6 +75,10 @@ class MavlinkLink(Section):
     """What to take from VFR_HUD, where the vehicle sends nothing better.
 
     It repeats GNSS and the autopilot's own filter: used beside those it counts twice."""
+    altitudes: tuple[Literal["ALTITUDE", "GLOBAL_POSITION_INT"], ...] = ()
+    """Messages to take the altitude of, for a sensor of kind altitude that hears no barometer.
+
+    It is what the autopilot's own filter makes of barometer and GNSS: used beside those it counts twice."""
     geoid_height: Annotated[Number, Field(ge=-120, le=120)] | None = None
     """Mean sea level above the WGS 84 ellipsoid at the site, m.
 

@@ -70,7 +70,10 @@ def test_a_bus_that_is_not_there_is_named(configuration: Configuration) -> None:
 
 def test_the_drivers_settings_are_what_the_configuration_says(tmp_path: Path) -> None:
     path = tmp_path / "rover.toml"
-    told = TOML.replace("system = 7", 'system = 7\nhud = ["altitude", "heading"]\ngeoid_height = -33.5')
+    told = TOML.replace(
+        "system = 7",
+        'system = 7\nhud = ["altitude", "heading"]\ngeoid_height = -33.5\naltitudes = ["ALTITUDE"]',
+    )
     path.write_text(told.replace('channel = "nosuchbus"', 'channel = "can0"\nrange_orientation = 0'))
     autopilot, bus, _ = load(path).link
     assert isinstance(autopilot, MavlinkSection)
@@ -78,7 +81,8 @@ def test_the_drivers_settings_are_what_the_configuration_says(tmp_path: Path) ->
     assert (settings.system, settings.components) == (7, {1})
     assert settings.hud == {"altitude", "heading"}
     assert settings.geoid_height == -33.5
-    assert settings.rates == DEFAULT_RATES | {"RAW_IMU": 50.0, "VFR_HUD": 10.0}
+    assert settings.altitudes == {"ALTITUDE"}
+    assert settings.rates == DEFAULT_RATES | {"RAW_IMU": 50.0, "VFR_HUD": 10.0, "ALTITUDE": 10.0}
     assert isinstance(bus, CanSection)
     assert can_settings(bus) == CanSettings(channel="can0", range_orientation=0)
 

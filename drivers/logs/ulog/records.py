@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from drivers.logs.onboard import Fields, Handler, Notes
-from drivers.mavlink.inertial import GAUSS, KELVIN, LARGEST_FIELD, LARGEST_FORCE, LARGEST_RATE
+from drivers.mavlink.inertial import GAUSS, HECTOPASCAL, KELVIN, LARGEST_FIELD, LARGEST_FORCE, LARGEST_RATE
 from drivers.sample import (
     AnyReading,
     Attitude,
@@ -27,6 +27,7 @@ from drivers.sample import (
 )
 
 FIX_2D, FIX_3D = 2, 3
+MOST_MILLIBAR = 2000.0  # no pressure of air in pascal is as low below 27 km
 DEGREE = math.pi / 180.0
 RPM = math.tau / 60.0
 
@@ -67,6 +68,19 @@ def vehicle_air_data(fields: Fields, _notes: Notes) -> list[AnyReading]:
     celsius = fields.get("baro_temp_celcius", fields.get("ambient_temperature"))
     known = celsius is not None and math.isfinite(celsius)
     return [Pressure(fields["baro_pressure_pa"], temperature=celsius + KELVIN if celsius and known else None)]
+
+
+def sensor_baro(fields: Fields, notes: Notes) -> list[AnyReading]:
+    """One barometer, where nobody has chosen among them: in pascal since PX4 1.13, before that in millibar."""
+    pressure = fields["pressure"]
+    if not math.isfinite(pressure):
+        notes.malformed["sensor_baro.pressure"] += 1
+        return []
+    celsius = fields.get("temperature", math.nan)
+    temperature = celsius + KELVIN if math.isfinite(celsius) else None
+    return [
+        Pressure(pressure * HECTOPASCAL if pressure < MOST_MILLIBAR else pressure, temperature=temperature)
+    ]
 
 
 def vehicle_attitude(fields: Fields, notes: Notes) -> list[AnyReading]:
@@ -211,6 +225,7 @@ def handlers() -> dict[str, Handler]:
         "sensor_combined": sensor_combined,
         "vehicle_magnetometer": vehicle_magnetometer,
         "vehicle_air_data": vehicle_air_data,
+        "sensor_baro": sensor_baro,
         "vehicle_attitude": vehicle_attitude,
         "distance_sensor": distance_sensor,
         "wheel_encoders": wheel_encoders,

@@ -118,6 +118,17 @@ def test_no_fix_an_old_fix_and_no_place(path: Path) -> None:
     assert reader.report().malformed == {"vehicle_gps_position.latitude": 1}
 
 
+def test_a_barometer_is_in_pascal_or_as_it_was_before_in_millibar(path: Path) -> None:
+    log = [
+        ulog.data("sensor_baro", START, 95_000.0, 20.0),
+        ulog.data("sensor_baro", START + 1, 950.0, NAN),
+        ulog.data("sensor_baro", START + 2, NAN, 20.0),
+    ]
+    samples, reader = read(path, ulog.header(), ulog.definitions(), *log)
+    assert [s.reading for s in samples] == [Pressure(95_000.0, None, 293.15), Pressure(95_000.0)]
+    assert reader.report().malformed == {"sensor_baro.pressure": 1}
+
+
 def test_the_other_sensors(path: Path) -> None:
     half = math.sqrt(0.5)
     log = [

@@ -21,6 +21,7 @@ FORMATS = {
     "float vel_n_m_s;float vel_e_m_s;float vel_d_m_s;uint8_t fix_type;uint8_t satellites_used;bool vel_ned_valid;",
     "vehicle_attitude": "uint64_t timestamp;float[4] q;",
     "vehicle_air_data": "uint64_t timestamp;float baro_pressure_pa;float baro_temp_celcius;",
+    "sensor_baro": "uint64_t timestamp;float pressure;float temperature;",
     "vehicle_magnetometer": "uint64_t timestamp;float[3] magnetometer_ga;",
     "distance_sensor": "uint64_t timestamp;float current_distance;float min_distance;float max_distance;"
     "float variance;int8_t signal_quality;uint8_t orientation;",

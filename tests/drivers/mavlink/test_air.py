@@ -50,3 +50,25 @@ def test_what_is_asked_of_the_hud(listen: Callable[..., Ear]) -> None:
     wrong = frame("VFR_HUD", 12.0, 3.5, 120.0, 0.1, -1, 40)
     assert len(ear.hear(wrong)) == 2
     assert ear.refused == {"VFR_HUD.heading": 1}
+
+
+ALTITUDE = frame("ALTITUDE", 9_000_000, 101.0, 503.5, 3.0, 4.0, 500.0, 2.0)
+GLOBAL_POSITION = frame("GLOBAL_POSITION_INT", 9_000, 470_000_000, 80_000_000, 503_500, 3_000, 0, 0, 0, 0)
+
+
+def test_the_autopilots_own_altitude_is_not_used_unless_asked(ear: Ear) -> None:
+    assert ear.hear(ALTITUDE, GLOBAL_POSITION) == []
+
+
+def test_what_is_asked_of_the_autopilots_altitudes(listen: Callable[..., Ear]) -> None:
+    """Above mean sea level, in metres and in millimetres; what says that it does not know is passed over."""
+    ear = listen(altitudes=frozenset({"ALTITUDE", "GLOBAL_POSITION_INT"}))
+    samples = ear.hear(ALTITUDE, GLOBAL_POSITION)
+    assert [(s.source, s.reading) for s in samples] == [
+        ("ALTITUDE", Altitude(pytest.approx(503.5))),
+        ("GLOBAL_POSITION_INT", Altitude(pytest.approx(503.5))),
+    ]
+    unknown = frame("ALTITUDE", 9_100_000, 101.0, math.nan, 3.0, 4.0, 500.0, 2.0)
+    nowhere = frame("GLOBAL_POSITION_INT", 9_100, 0, 0, 17_000, 3_000, 0, 0, 0, 0)
+    assert ear.hear(unknown, nowhere) == []
+    assert ear.passed_over == {"ALTITUDE.altitude_amsl": 1, "GLOBAL_POSITION_INT.lat": 1}

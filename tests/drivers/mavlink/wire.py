@@ -21,6 +21,8 @@ LAYOUTS: dict[str, tuple[int, int, str]] = {
     "GPS_GLOBAL_ORIGIN": (49, 39, "<iiiQ"),
     "REQUEST_DATA_STREAM": (66, 148, "<HBBBB"),
     "VFR_HUD": (74, 20, "<ffffhH"),
+    "GLOBAL_POSITION_INT": (33, 104, "<IiiiihhhH"),
+    "ALTITUDE": (141, 47, "<Qffffff"),
     "COMMAND_LONG": (76, 152, "<fffffffHBBB"),
     "COMMAND_ACK": (77, 143, "<HBBiBB"),
     "POSITION_TARGET_LOCAL_NED": (85, 140, "<IfffffffffffHB"),
