@@ -12,6 +12,7 @@ arithmetic of the correction is the Kalman filter's own. Models of the vehicle a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
@@ -29,9 +30,9 @@ from filters.kalman import (
     corrected,
     require_finite,
     require_shape,
-    symmetric,
     wrap,
 )
+from filters.kernels.kalman import propagate
 
 Control = TypeVar("Control")
 ControlIn = TypeVar("ControlIn", contravariant=True)
@@ -155,8 +156,15 @@ class ExtendedKalmanFilter(Generic[Control]):
         """
         require_duration("extended Kalman filter", duration)
         mean, jacobian, noise = self._motion.move(self.mean, control, duration)
-        covariance = symmetric(jacobian @ self.covariance @ jacobian.T + noise)
-        require_finite("extended Kalman prediction", mean, covariance)
+        covariance = np.empty_like(self.covariance)
+        finite = propagate.direct(
+            np.ascontiguousarray(jacobian, np.float64),
+            self.covariance,
+            np.ascontiguousarray(noise, np.float64),
+            covariance,
+        )
+        if not (finite and math.isfinite(mean.sum())):
+            require_finite("extended Kalman prediction", mean, covariance)
         wrap(mean, self.angles)
         self.mean, self.covariance = mean, covariance
 

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from filters import chi_square
+from filters.kernels import kalman as kernels
 
 Matrix = NDArray[np.float64]
 
-LOG_TWO_PI = math.log(2.0 * math.pi)
+LOG_TWO_PI = kernels.LOG_TWO_PI
 
 
 class Correction(NamedTuple):
@@ -220,26 +221,40 @@ def corrected(
     require_shape("Kalman correction: expected", expected, z.shape)
     require_shape("Kalman correction: model", jacobian, (z.size, belief.mean.size))
     require_shape("Kalman correction: noise", noise, (z.size, z.size))
-    measured = np.flatnonzero(~np.isnan(z))
-    h = jacobian[measured]
-    spread = noise[np.ix_(measured, measured)]
-    require_finite("Kalman correction", z[measured], expected[measured], h, spread)
     residual = z - expected
     wrap(residual, checked_angles("Kalman correction", angles, z.size))
-    nu = residual[measured]
+    if np.isnan(z).any():
+        measured = np.flatnonzero(~np.isnan(z))
+        residual, jacobian = residual[measured], jacobian[measured]
+        noise = noise[np.ix_(measured, measured)]
+    nu = np.ascontiguousarray(residual)
     if nu.size == 0:
-        return belief, Correction(nu, spread, 0.0, 0.0, accepted=True)
-    innovation_covariance = symmetric(h @ belief.covariance @ h.T + spread)
-    root = np.linalg.cholesky(innovation_covariance)
-    white = np.linalg.solve(root, nu)
-    nis = float(white @ white)
-    log_evidence = -0.5 * (nis + nu.size * LOG_TWO_PI) - float(np.log(np.diagonal(root)).sum())
-    accepted = gate is None or nis <= chi_square.quantile(gate, nu.size)
-    correction = Correction(nu, innovation_covariance, nis, log_evidence, accepted)
-    if not accepted:
-        return belief, correction
-    gain: Matrix = np.linalg.solve(innovation_covariance, h @ belief.covariance).T.astype(np.float64)
-    return Gaussian(belief.mean + gain @ nu, joseph(belief.covariance, gain, h, spread)), correction
+        return belief, Correction(nu, noise, 0.0, 0.0, accepted=True)
+    spread, mean, covariance = (
+        np.empty_like(noise),
+        np.empty_like(belief.mean),
+        np.empty_like(belief.covariance),
+    )
+    fate, nis, log_evidence = kernels.correct.direct(
+        np.ascontiguousarray(belief.mean),
+        np.ascontiguousarray(belief.covariance),
+        nu,
+        np.ascontiguousarray(jacobian, np.float64),
+        np.ascontiguousarray(noise, np.float64),
+        math.inf if gate is None else chi_square.quantile(gate, nu.size),
+        spread,
+        mean,
+        covariance,
+    )
+    if fate == kernels.NOT_FINITE:
+        require_finite("Kalman correction", nu, jacobian, noise)
+    if fate == kernels.NOT_POSITIVE:
+        raise np.linalg.LinAlgError(
+            f"Kalman correction: what is expected has no positive covariance: {spread}"
+        )
+    accepted = fate == kernels.ACCEPTED
+    correction = Correction(nu, spread, nis, log_evidence, accepted)
+    return (Gaussian(mean, covariance) if accepted else belief), correction
 
 
 def joseph(covariance: Matrix, gain: Matrix, observation: Matrix, noise: Matrix) -> Matrix:
