@@ -89,3 +89,8 @@ class Seeing:
         hides = any(blank.hides(sample, seconds) for blank in self._blanks)
         self.hidden += hides
         return not hides
+
+    @property
+    def begin(self) -> int:
+        """When the beginning was, nanoseconds on the receive clock; 0 before there was one."""
+        return self._begin or 0

@@ -23,8 +23,9 @@ from service.decisions import Decided
 from service.estimate import Estimate
 from service.estimator import Estimator
 from service.estimator.shadow import Shadow
-from service.replay.blanking import Blank, Seeing
+from service.replay.blanking import SECOND, Blank, Seeing
 from service.replay.comparing import Again, Comparing
+from service.replay.outage import Outage, outages_of
 from service.replay.recorded import RecordedRun, recorded_ticks
 from service.replay.rows import EstimateFile
 from service.replay.sources import LogError, merged, open_log
@@ -81,6 +82,10 @@ class Run:
         What the extended Kalman filter made of the same samples.
     blanked : int
         Samples that the plan took away.
+    tracked_after : float or None
+        Seconds until the health was tracking for the first time.
+    outages, shadow_outages : list[Outage]
+        What became of the belief while they were, and of the Kalman filter's.
     again : Again or None
         How many of the estimates that a recorded run published came out the same, byte for byte.
     trace : Trace or None
@@ -106,8 +111,11 @@ class Run:
     sensors: dict[str, tuple[int, dict[str, int]]]
     links: list[LinkReport]
     shadow: ShadowRun
+    tracked_after: float | None = None
     last_reason: str = ""
     blanked: int = 0
+    outages: list[Outage] = field(default_factory=list[Outage])
+    shadow_outages: list[Outage] = field(default_factory=list[Outage])
     again: Again | None = None
     trace: Trace | None = None
     levels: list[int] = field(default_factory=list[int])
@@ -123,8 +131,11 @@ class Run:
             "late_samples": self.late_samples,
             "dropped": self.dropped,
             "blanked": self.blanked,
+            "outages": [outage.rounded() for outage in self.outages],
+            "shadow_outages": [outage.rounded() for outage in self.shadow_outages],
             **({} if self.again is None else {"again": self.again._asdict()}),
             "health": self.health,
+            "tracked_after_s": None if self.tracked_after is None else round(self.tracked_after, 3),
             "seconds": round(self.seconds, 3),
             "real_time_factor": round(self.real_time_factor, 1),
             "ticks": self.ticks,
@@ -245,6 +256,9 @@ def replay(plan: Plan, seed: int, progress: Progress = lambda share, seconds: No
     progress(1.0, tally.ticks / plan.configuration.loop.rate)
     run = _run(seed, plan, estimator, tally, beside, source.reports(), seconds, now)
     run.blanked = source.seen.hidden
+    begin = source.seen.begin / SECOND
+    run.outages = outages_of(tally.path.track(), plan.truth, plan.blanks, begin)
+    run.shadow_outages = outages_of(beside.path.track(), plan.truth, plan.blanks, begin)
     run.again = again.result()
     run.story = teller.story()
     run.trace = None if tracer is None else tracer.trace()
@@ -296,6 +310,7 @@ def _run(
         sensors={s.name: (s.accepted, s.refused) for s in estimator.sensors(now)},
         links=reports,
         shadow=beside.run(plan.truth),
+        tracked_after=tally.tracked_after,
         last_reason=last.reason if last else "",
     )
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import multiprocessing
 import os
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
 from multiprocessing.queues import SimpleQueue
 
 from service.consistency import bounds
+from service.replay.outage import Outage
 from service.replay.run import Plan, Run, replay
 
 Report = Callable[[int, float, float], None]
@@ -67,14 +68,16 @@ SCORES = (
     "coverage_99",
     "log_score",
 )
-SUMMARISED = (*SCORES, "particles_mean", "real_time_factor")
+OUTAGE = ("error_m", "radius_m", "distance_m", "share", "coverage_95")
+SUMMARISED = (*SCORES, "particles_mean", "real_time_factor", "tracked_after_s")
 
 
 def summary(runs: list[Run]) -> dict[str, object]:
     """Return mean, standard deviation, least and greatest over the seeds of every figure, and the health shares.
 
     ``shadow`` holds the same of the extended Kalman filter, and how many innovations its gate kept out; ``checks`` the
-    questions of a scenario, by name: passed by how many of how many, and the figures found; ``nees_bounds`` where the
+    questions of a scenario, by name: passed by how many of how many, and the figures found; ``outages`` what became of
+    each blanking, and ``shadow_outages`` the Kalman filter's; ``nees_bounds`` where the
     mean NEES of a consistent filter lies with 95 %, given how many independent ticks all runs are worth.
     """
     spread: dict[str, object] = {"seeds": len(runs)}
@@ -83,10 +86,21 @@ def summary(runs: list[Run]) -> dict[str, object]:
     spread["health"] = {s: round(statistics.fmean(run.health.get(s, 0.0) for run in runs), 4) for s in states}
     shadows = [run.shadow.row() | {"gated": sum(run.shadow.gated.values())} for run in runs]
     spread["shadow"] = _spreads(shadows, (*SCORES, "gated", "ticks"))
+    spread["outages"] = _fared([run.outages for run in runs])
+    spread["shadow_outages"] = _fared([run.shadow_outages for run in runs])
     spread["checks"] = _answers(runs)
     worth = [run.score.nees_samples for run in runs if run.score.nees_samples is not None]
     spread["nees_bounds"] = [round(bound, 4) for bound in bounds(sum(worth))] if worth else None
     return spread
+
+
+def _fared(outages: list[list[Outage]]) -> list[dict[str, object]]:
+    """Return the spreads of each blanking's figures over the seeds that have as many of them."""
+    told = [given for given in outages if len(given) == len(outages[0])]
+    return [
+        {"what": given[0].what, **_spreads([one.rounded() for one in given], OUTAGE)}
+        for given in zip(*told, strict=True)
+    ]
 
 
 def _answers(runs: list[Run]) -> dict[str, object]:
@@ -101,7 +115,7 @@ def _answers(runs: list[Run]) -> dict[str, object]:
     return answers
 
 
-def _spreads(rows: list[dict[str, object]], names: tuple[str, ...]) -> dict[str, object]:
+def _spreads(rows: Sequence[Mapping[str, object]], names: tuple[str, ...]) -> dict[str, object]:
     spreads: dict[str, object] = {}
     for name in names:
         values = [float(value) for row in rows if isinstance(value := row[name], int | float)]

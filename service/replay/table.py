@@ -50,9 +50,16 @@ def show(runs: list[Run], console: Console, title: str) -> None:
     console.print(table)
     health: dict[str, float] = spread["health"]
     shares = ", ".join(f"{state} {share:.1%}" for state, share in health.items())
-    console.print(f"  health: {shares}", highlight=False)
+    since = spread.get("tracked_after_s")
+    settled = (
+        "" if since is None else f"; tracking after {since['mean']:.1f} s, the last seed {since['max']:.1f} s"
+    )
+    console.print(f"  health: {shares}{settled}", highlight=False)
     slowest = min(run.real_time_factor for run in runs)
     console.print(f"  the slowest run: {speed_in_words(slowest)}", highlight=False)
+    for name, key in (("", "outages"), (f"{SHADOW}: ", "shadow_outages")):
+        for fared in spread[key]:
+            console.print(f"  {name}{_outage(fared)}", highlight=False)
     _show_details(runs[0], console)
     _show_shadow(runs[0], console)
 
@@ -84,6 +91,16 @@ def _cells(row: dict[str, Any]) -> list[str]:
 
 def _column(spread: dict[str, Any], statistic: str) -> dict[str, Any]:
     return {name: spread.get(name, {}).get(statistic) for name, _, _ in FIGURES}
+
+
+def _outage(fared: dict[str, Any]) -> str:
+    """Say how a blanking ended, the mean over the seeds and the worst."""
+    error, radius, distance = (fared[name]["mean"] for name in ("error_m", "radius_m", "distance_m"))
+    share = f", {fared['share']['mean']:.2%} of {distance:.0f} m" if "share" in fared else ""
+    return (
+        f"{fared['what']}: at its end {error:.2f} m off{share}; the worst {fared['error_m']['max']:.2f} m; "
+        f"95 % within {radius:.1f} m; {fared['coverage_95']['mean']:.1%} inside meanwhile"
+    )
 
 
 def _show_details(run: Run, console: Console) -> None:

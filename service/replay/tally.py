@@ -65,16 +65,21 @@ class Path2D:
 
 @dataclass
 class Tally:
-    """The estimates of a run, counted."""
+    """The estimates of a run, counted; ``tracked`` is the Unix time of the first whose health is tracking."""
 
     path: Path2D = field(default_factory=Path2D)
     health: Counter[HealthState] = field(default_factory=Counter[HealthState])
     particles: int = 0
+    first: Estimate | None = None
     last: Estimate | None = None
+    tracked: float | None = None
 
     def add(self, estimate: Estimate, places: Hypotheses | None = None) -> None:
         """Count one tick, with the places that were published beside it where there are several."""
         self.last = estimate
+        self.first = self.first or estimate
+        if self.tracked is None and estimate.health is HealthState.TRACKING:
+            self.tracked = estimate.time
         self.health[estimate.health] += 1
         self.particles += estimate.particles
         north, east, _ = estimate.position
@@ -87,6 +92,11 @@ class Tally:
     def ticks(self) -> int:
         """How many there were."""
         return sum(self.health.values())
+
+    @property
+    def tracked_after(self) -> float | None:
+        """Seconds from the first estimate to the first whose health is tracking; ``None`` if none is."""
+        return None if self.tracked is None or self.first is None else self.tracked - self.first.time
 
 
 def mixture_of(places: Hypotheses) -> Mixture | None:
