@@ -15,18 +15,48 @@ What the reading says by way of the bias of where the vehicle had been is left o
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
+from contextlib import contextmanager
 
 import numpy as np
 
 from filters.kernels.compile import Float32Array
-from filters.motion.unicycle import Unicycle
+from filters.motion.unicycle import Unicycle, UnicycleControl
 
 GYRO_NOISE = 1e-3
 """Of the reading of a gyro that stands, rad/s times the square root of a second: quantisation and vibration in it."""
 
 
 class StandingUnicycle(Unicycle):
-    """Unicycle motion, and standing still."""
+    """Unicycle motion, and standing still; its noise is what was stated, or the share of it that was learned.
+
+    Attributes
+    ----------
+    distance_share, turn_share : float
+        Of the stated variances: what the noise turned out to be.
+    """
+
+    distance_share = turn_share = 1.0
+    _learned = False
+
+    @contextmanager
+    def as_learned(self) -> Generator[None]:
+        """Have the noise be what was learned, not what was stated, for as long as this lasts."""
+        self._learned = True
+        try:
+            yield
+        finally:
+            self._learned = False
+
+    def noise_variances(self, control: UnicycleControl, duration: float) -> tuple[float, float]:
+        """Return the variances that a control leaves open; what it says of itself (a gap) is no one's to share."""
+        if not self._learned:
+            return super().noise_variances(control, duration)
+        along, about = super().noise_variances(control._replace(distance_sigma=0.0, turn_sigma=0.0), duration)
+        return (
+            self.distance_share * along + control.distance_sigma**2,
+            self.turn_share * about + control.turn_sigma**2,
+        )
 
     def stand(
         self,

@@ -22,6 +22,7 @@ from filters.particle import ParticleFilter
 from service.checkpoint import Kept
 from service.config import Configuration, Start
 from service.estimate import Estimate, Hypotheses, SensorStatus
+from service.estimator.caution import caution_of
 from service.estimator.companion import Companion, Watched
 from service.estimator.course import CROWD, Cause, Course, Level
 from service.estimator.deputy import Deputy
@@ -99,6 +100,10 @@ class Estimator:
             mode = self._mode
             self._population.still = lambda: mode.still
             self._fusion.companions.append(mode)
+        caution = caution_of(configuration, self._vehicle, self._filter)
+        if caution is not None:
+            self._fusion.caution = caution
+            self._fusion.companions.append(caution)
         self._trust = trust_of(configuration, self._vehicle, self._filter, seed)
         if self._trust is not None:
             self._fusion.trust = self._trust

@@ -2,11 +2,16 @@
 
 The particles weigh fixes as if their errors were new every second. Published is, beside the particles' own spread, the
 share of the mean that the receiver's error of the last minute has, reckoned along with every absolute measurement.
+
+A latency that was stated lasts longer still: it is not known better than to some hundredths of a second, and shifts all
+fixes by as much of the way. So much is the region wider along the velocity.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from filters.belief import Evidence
 from filters.consider import LastingError
@@ -32,10 +37,12 @@ class Lasting:
     def __init__(self) -> None:
         self._error = LastingError(DURATION)
         self._variance = 0.0
+        self._timing = 0.0
 
     def started(self, time: int) -> None:
         """Forget: the particles were drawn anew, with all that is unknown of their place."""
         self._error.restart()
+        self._timing = 0.0
 
     def moved(self, start: int, end: int) -> None:
         """Let the receiver's error change."""
@@ -47,6 +54,7 @@ class Lasting:
             return
         value = measured.value
         if isinstance(value, PositionMeasurement):
+            self._timing = measured.timing
             gain = self._gain(value.sigma_north or 0.0)
             if measured.lasting > 0.0:
                 self._error.corrected(gain, measured.lasting)
@@ -61,13 +69,13 @@ class Lasting:
     def widened(self, pose: Pose) -> Pose:
         """Return ``pose`` with the lasting error's variance on both axes; its own is what the next gains are of."""
         self._variance = 0.5 * float(pose.covariance[0, 0] + pose.covariance[1, 1])
-        added = self._error.variance
+        way = self._timing * np.array([pose.velocity[0] or 0.0, pose.velocity[1] or 0.0])
+        added = self._error.variance + 0.5 * float(way @ way)
         if added <= 0.0:
             return pose
         own = radius(pose.covariance[:2, :2], 0.95)
         covariance = pose.covariance.copy()
-        covariance[0, 0] += added
-        covariance[1, 1] += added
+        covariance[:2, :2] += self._error.variance * np.eye(2) + np.outer(way, way)
         wider = radius(covariance[:2, :2], 0.95)
         # with several hypotheses the radius is larger than the covariance alone would have it
         beyond = math.hypot(pose.radius95, REACH * math.sqrt(added)) if pose.radius95 > 1.01 * own else wider
