@@ -147,7 +147,7 @@ class Wiring:
             RECORDER,
             self._command("recorder", "--records", inlet, *self._recorded),
             (self._file, inlet),
-            "\n".join(names),
+            "\n".join(names) if "--decisions" in self._recorded else "",
             environment=_single_threaded(1),
         )
 

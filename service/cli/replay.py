@@ -19,6 +19,8 @@ beliefd replay flight.tlog --report flight.html [dim]· track, error, innovation
 
 beliefd replay car.log gnss.tlog --blank position:20-50 [dim]· how it coasts without fixes[/dim]
 
+beliefd replay run.mcap [dim]· a run of beliefd run --record: the same again, to the byte[/dim]
+
 beliefd replay plaza2.tlog --truth plaza2_truth.csv --seeds 20 --json
 """
 
@@ -27,7 +29,7 @@ def command(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="Recordings: .tlog, .bin, .ulg, candump .log(.gz), .asc, .blf, .trc.",
+            help="Recordings: .tlog, .bin, .ulg, candump .log(.gz), .asc, .blf, .trc, .mcap.",
             metavar="LOG…",
             exists=True,
             dir_okay=False,
@@ -35,7 +37,9 @@ def command(
     ],
     config: Annotated[
         Path | None,
-        typer.Option(help="The configuration, or a file with the site only; default: LOG's .toml beside it."),
+        typer.Option(
+            help="The configuration, or the site only; default: what a recorded run holds, or LOG's .toml beside it."
+        ),
     ] = None,
     truth: Annotated[
         Path | None,

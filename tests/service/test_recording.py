@@ -62,7 +62,9 @@ class Drive:
         command = [sys.executable, "-m", "sim_vehicle", "beacons", "--seconds", "600", "--realtime"]
         port = free_port(socket.SOCK_DGRAM)
         command += ["--mavlink", f"udpout:127.0.0.1:{port}", "--config", str(self.configuration)]
-        self.processes = [subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)]
+        self.processes: list[subprocess.Popen[Any]] = [
+            subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
+        ]
         wait_for(lambda: self.configuration.exists() and "[[beacon]]" in self._text, "a configuration")
         added = f'[publish]\nzenoh = "{folder}/zenoh.json5"\n[state]\ndirectory = "{folder}/none"\n'
         self.configuration.write_text(f"{self._text}\n{added}")
