@@ -31,6 +31,11 @@ source = "GPS_RAW_INT"
 kind = "velocity"
 [[sensor]]
 kind = "heading"
+[[sensor]]
+kind = "speed"
+[[sensor]]
+kind = "altitude"
+estimate = ["bias"]
 [[beacon]]
 id = 4
 position = [10.0, 0.0, 0.0]
