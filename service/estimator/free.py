@@ -61,6 +61,7 @@ class FreeVehicle:
         )
         self.timing_sigma = settings.timing_sigma
         self.controls: Controls = controls_of(settings)
+        self.guided = False
         self.slow_states: list[SlowState] = sensor_states(configuration)
         self._height = height_of(configuration) if height_state(configuration) is None else None
         if self._height is None:

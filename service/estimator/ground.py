@@ -80,6 +80,7 @@ class GroundVehicle:
             odometry_scale_sigma=settings.odometry_scale_sigma,
         )
         self.controls: Controls = controls_of(settings, configuration.sensor)
+        self.guided = True
         self.slow_states: list[SlowState] = sensor_states(configuration)
         self._height = height_of(configuration)
         self._gait: Gait | None = None

@@ -14,6 +14,7 @@ from drivers.sample import Origin, Sample
 from service.config import Configuration
 from service.estimate import SensorStatus
 from service.estimator.binding import BoundSensor, surroundings_of
+from service.estimator.complete import Complete
 from service.estimator.controls import Controls
 from service.estimator.records import SensorRecords
 from service.geodesy import Geodetic, LocalFrame
@@ -54,6 +55,8 @@ class Intake:
         Who takes measurements that the horizon has passed.
     caught_up : int
         How many of them were taken.
+    complete : Complete
+        Up to when nothing is missing.
     dropped : Counter[str]
         What came and was not used, by reason.
     """
@@ -65,6 +68,7 @@ class Intake:
         self.frame = _configured_frame(configuration)
         self.latecomers: Latecomers | None = None
         self.caught_up = 0
+        self.complete = Complete()
         self._controls = controls
         self._sensors = [BoundSensor(sensor, surroundings) for sensor in configuration.sensor]
         self._timeline: Timeline[Waiting] = Timeline()
@@ -166,6 +170,7 @@ class Intake:
             record.refused["implausible"] += 1
             return
         self._heard.add(sensor.title)
+        self.complete.heard(sensor.name(sample), sample.time - sensor.delay)
         reason = self._timeline.insert(Waiting(sensor, sample), sample.time - sensor.delay, sample.received)
         if reason == "late" and self.latecomers is not None:
             reason = (

@@ -30,6 +30,9 @@ class Vehicle(Protocol):
     slow_states: list[SlowState]
     """Slow states beside those of the motion: what the sensors ask for."""
 
+    guided: bool
+    """Whether controls tell the way from the horizon to now; else every measurement is wanted as soon as it may be."""
+
     @property
     def motion(self) -> Motion[Any, Any]:
         """What moves the particles."""
