@@ -171,6 +171,7 @@ def test_every_option_named_exists() -> None:
         for words in (
             [],
             ["run"],
+            ["send"],
             ["replay"],
             ["scenario"],
             ["textbook"],
