@@ -72,9 +72,10 @@ class Envelope:
             self._older, self._newer = self._newer, (offset, now)
             self._started, self._count = now, 0
         self._count += 1
-        if offset <= risen(self._newer, now):
-            self._newer = (offset, now)
-        return self.at(now)
+        newer = risen(self._newer, now)
+        if offset <= newer:
+            self._newer, newer = (offset, now), offset
+        return newer if self._older is None else min(newer, risen(self._older, now))
 
     def at(self, now: int) -> int:
         """Return the envelope at ``now``; there must have been a difference."""

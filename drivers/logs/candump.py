@@ -9,7 +9,9 @@ error frame.
 from __future__ import annotations
 
 import re
+from binascii import unhexlify
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import BinaryIO
 
 from drivers.can import CanFrame
@@ -44,23 +46,27 @@ def parse(line: bytes) -> LoggedFrame | None:
         raise ValueError("error_frame")
     if remote is not None:
         return None
-    data = bytes.fromhex(content.decode())
+    data = unhexlify(content)
     flexible = flags is not None
     if len(data) > (_LARGEST_FLEXIBLE if flexible else _LARGEST_CLASSIC):
         raise ValueError("bad_line")
     frame = CanFrame(identifier & _EXTENDED_MASK, data, len(digits) > _STANDARD_DIGITS, flexible)
-    return LoggedFrame(int(seconds + fraction.ljust(9, b"0")), channel.decode(errors="replace"), frame)
+    return LoggedFrame(int(seconds + fraction.ljust(9, b"0")), _text(channel), frame)
+
+
+@lru_cache(maxsize=64)
+def _text(channel: bytes) -> str:
+    return channel.decode(errors="replace")
 
 
 def frames(file: BinaryIO, tally: Tally) -> Iterator[LoggedFrame]:
     """Yield the frames of a recording, plain or gzipped; a damaged line is counted and ends nothing."""
     for line in lines(file, tally):
-        if not line.strip():
-            continue
         try:
             logged = parse(line)
         except ValueError as error:
-            tally.refused[str(error)] += 1
+            if line.strip():
+                tally.refused[str(error)] += 1
             continue
         if logged is None:
             tally.skipped += 1

@@ -11,6 +11,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -60,7 +61,7 @@ def lines(file: BinaryIO, tally: Tally) -> Iterator[bytes]:
     file.seek(0)
     text: BinaryIO = gzip.GzipFile(fileobj=file) if zipped else file  # pyright: ignore[reportAssignmentType]
     try:
-        yield from iter(lambda: text.readline(LONGEST_LINE), b"")
+        yield from iter(partial(text.readline, LONGEST_LINE), b"")
     except (EOFError, gzip.BadGzipFile, zlib.error):
         tally.refused["truncated_file"] += 1
 

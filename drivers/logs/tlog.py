@@ -49,6 +49,7 @@ class TlogReader:
         self._faults: Counter[str] = Counter()
         self._kinds: Counter[int] = Counter()
         self._position = 0
+        self._ahead: tuple[int, int | None] = (-1, None)  # where the next entry begins, and its stamp
 
     @property
     def size(self) -> int:
@@ -104,7 +105,9 @@ class TlogReader:
         if self._clock is None:
             self._clock = ReceiveClock(_stamps(data, at, 3))
         following = _stamp(data, end) if end + STAMP <= len(data) else None
-        return self._clock.read(_stamp(data, at), following)
+        before, stamp = self._ahead
+        self._ahead = (end, following)
+        return self._clock.read(stamp if before == at and stamp is not None else _stamp(data, at), following)
 
     def _resynchronise(self, data: mmap.mmap, at: int, fault: Frame | Fault) -> int:
         """Return where the next good entry starts; count the stretch once, and its bytes."""
