@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filters.density.k_means import Clusters, KMeans
+from filters.density.clusters import Clusters
+from filters.density.k_means import KMeans
 from filters.motion import Unicycle
 from filters.particle import ParticleFilter
 
