@@ -11,7 +11,7 @@ import typer
 
 from sim_vehicle import configuration, realtime, recording, scenarios
 from sim_vehicle.configuration import Listening
-from sim_vehicle.ports import CanPort, PortError, open_can, open_mavlink
+from sim_vehicle.ports import CanPort, PortError, bus_of, open_can, open_mavlink
 from sim_vehicle.scenario import Scenario
 from sim_vehicle.vehicle import Vehicle, prepare
 
@@ -41,12 +41,15 @@ def drive(
     can: Annotated[
         str,
         typer.Option(
-            help="INTERFACE:CHANNEL of python-can (socketcan:vcan0); slcan:PATH makes an adapter there.",
+            help="vcan0, or INTERFACE:CHANNEL of python-can; slcan:PATH makes an adapter there.",
             show_default=False,
         ),
     ] = "",
     real_time: Annotated[
-        bool, typer.Option("--realtime", help="Drive by the host's clock, on the links.")
+        bool,
+        typer.Option(
+            "--realtime", help="Drive by the host's clock, on the links; so it does with --mavlink anyway."
+        ),
     ] = False,
     write: Annotated[
         Path | None,
@@ -79,11 +82,11 @@ def drive(
     duration = drawn.seconds if seconds is None else seconds
     if write is not None and not (real_time or mavlink or can or truth or config):
         _write(drawn, seed, duration, write)
-    elif real_time and mavlink and write is None:
+    elif mavlink and write is None:
         _drive(drawn, seed, duration, mavlink, can, truth, config)
     else:
         _refuse(
-            "needs either --realtime with --mavlink URL (and --can, --truth, --config), or --write STEM alone"
+            "needs either --mavlink URL (and --realtime, --can, --truth, --config), or --write STEM alone"
         )
 
 
@@ -148,8 +151,7 @@ def _other_side(address: str) -> str:
 
 
 def _channel(bus: str) -> tuple[str, str] | None:
-    interface, _, channel = bus.partition(":")
-    return (interface, channel) if bus else None
+    return bus_of(bus) if bus else None
 
 
 def main() -> None:

@@ -16,6 +16,7 @@ from sim_vehicle.frame import CanFrame
 from sim_vehicle.slcan import Adapter
 
 LARGEST_DATAGRAM = 65_535
+SOCKETCAN = "socketcan"
 LARGEST_AUDIENCE = 8
 """UDP peers that are sent to; whoever spoke longest ago makes room for a new one."""
 LARGEST_BACKLOG = 65_536
@@ -282,21 +283,27 @@ class BusPort:
         self._bus.shutdown()
 
 
+def bus_of(where: str) -> tuple[str, str]:
+    """Return interface and channel of ``INTERFACE:CHANNEL``, or of a channel of SocketCAN alone."""
+    interface, colon, channel = where.partition(":")
+    return (interface, channel) if colon else (SOCKETCAN, where)
+
+
 def open_can(where: str) -> CanPort:
     """Open the bus.
 
     Parameters
     ----------
     where : str
-        ``INTERFACE:CHANNEL``; with ``slcan:PATH`` the simulator is the serial adapter, and PATH leads to its
-        port.
+        ``INTERFACE:CHANNEL``, or a channel of SocketCAN alone; with ``slcan:PATH`` the simulator is the serial
+        adapter, and PATH leads to its port.
 
     Raises
     ------
     PortError
         There is no such interface, or it cannot be opened.
     """
-    interface, _, channel = where.partition(":")
+    interface, channel = bus_of(where)
     if not interface or not channel:
         raise PortError(f"--can {where}: needs INTERFACE:CHANNEL, as socketcan:vcan0 or slcan:/tmp/can0")
     try:

@@ -34,7 +34,7 @@ def command(
     without: Annotated[
         list[str] | None,
         typer.Option(
-            help="A switch of [honesty] to turn off (trust, hypotheses, …, see docs); may be repeated.",
+            help="A switch of \\[honesty] to turn off (trust, hypotheses, …, see docs); may be repeated.",
             show_default=False,
         ),
     ] = None,

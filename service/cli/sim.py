@@ -18,7 +18,11 @@ beliefd sim beacons --mavlink udpout:127.0.0.1:14550 --can vcan0 --realtime
 
 beliefd sim beacons --write out/beacons [dim]· out/beacons.tlog and its truth, faster than real time[/dim]
 
-Every option after SCENARIO is the simulator's own: python -m sim_vehicle --help
+--mavlink URL [dim]· where its telemetry goes[/dim]   --can CHANNEL [dim]· where its bus is[/dim]
+
+--realtime [dim]· at the pace of the clock[/dim], or --write STEM [dim]· into logs, with their truth[/dim]
+
+Every option after SCENARIO is the simulator's own; all of them: python -m sim_vehicle --help
 """
 SETTINGS = {"allow_extra_args": True, "ignore_unknown_options": True}
 

@@ -39,17 +39,20 @@ def test_help_teaches_every_option() -> None:
     ("arguments", "complaint"),
     [
         (["nosuch", "--write", "x"], "no scenario 'nosuch'; there are beacons, demo"),
-        (["beacons"], "needs either --realtime with --mavlink URL"),
-        (["beacons", "--realtime"], "needs either --realtime with --mavlink URL"),
-        (["beacons", "--mavlink", "udpin:127.0.0.1:0"], "needs either --realtime with --mavlink URL"),
+        (["beacons"], "needs either --mavlink URL"),
+        (["beacons", "--realtime"], "needs either --mavlink URL"),
         (
             ["beacons", "--write", "x", "--realtime", "--mavlink", "udpin:127.0.0.1:0"],
             "or --write STEM alone",
         ),
         (["beacons", "--realtime", "--mavlink", "smoke:signals"], "--mavlink smoke:signals: needs udpout"),
         (
-            ["demo", "--realtime", "--mavlink", "udpin:127.0.0.1:0", "--can", "can0"],
+            ["demo", "--realtime", "--mavlink", "udpin:127.0.0.1:0", "--can", "socketcan:"],
             "needs INTERFACE:CHANNEL",
+        ),
+        (
+            ["demo", "--mavlink", "udpin:127.0.0.1:0", "--can", "nosuchcan9"],
+            "--can nosuchcan9: ",
         ),
         (["beacons", "--seed", "-1", "--write", "x"], "--seed"),
         (["beacons", "--seconds", "0", "--write", "x"], "--seconds"),

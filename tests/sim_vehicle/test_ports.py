@@ -174,7 +174,8 @@ def test_a_bus_of_python_can_carries_the_frames_both_ways() -> None:
 @pytest.mark.parametrize(
     ("where", "complaint"),
     [
-        ("can0", "needs INTERFACE:CHANNEL"),
+        ("socketcan:", "needs INTERFACE:CHANNEL"),
+        ("nosuchcan9", "--can nosuchcan9: "),
         ("nosuch:can0", "nosuch"),
         ("socketcan:nosuchcan9", "--can socketcan:nosuchcan9: "),
     ],

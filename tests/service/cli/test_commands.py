@@ -42,6 +42,14 @@ def configuration(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [("replay", "beliefd[view]"), ("scenario", "[honesty]"), ("run", "beliefd[record]"), ("send", "[start]")],
+)
+def test_what_stands_in_brackets_is_text_and_no_markup(command: str, words: str) -> None:
+    assert words in beliefd(command, "--help").stdout
+
+
 COMMANDS = ["demo", "run", "check", "sim", "listen", "send", "replay", "scenario", "textbook", "service"]
 
 
