@@ -16,6 +16,7 @@ from typing import BinaryIO, NamedTuple
 
 from drivers.can import CanFrame
 from drivers.logs.canlog import LoggedFrame, Tally
+from drivers.logs.log_file import lost
 
 FILE_MAGIC = b"LOGG"
 _MAGIC = b"LOBJ"
@@ -119,7 +120,6 @@ def _content(kind: int, head: bytes, body: bytes, tally: Tally) -> Iterator[byte
 
 def _resynchronise(file: BinaryIO, at: int, tally: Tally) -> bool:
     """Go to the next object after damage at ``at``; ``False`` when there is none."""
-    tally.refused["bad_header"] += 1
     start = at + 1
     file.seek(start)
     kept = b""
@@ -129,11 +129,11 @@ def _resynchronise(file: BinaryIO, at: int, tally: Tally) -> bool:
         if found >= 0:
             place = start + found
             file.seek(place)
-            tally.refused["lost_bytes"] += place - at
+            lost(tally.refused, "bad_header", at, place)
             return True
         kept = window[-3:]
         start += len(window) - len(kept)
-    tally.refused["lost_bytes"] += file.tell() - at
+    lost(tally.refused, "bad_header", at, file.tell())
     return False
 
 
@@ -194,9 +194,7 @@ def _objects(contents: Iterator[bytes], tally: Tally) -> Iterator[_Object]:
             if at + size + _OBJECT.size > len(stream):
                 break
             if _MAGIC not in stream[at + size : at + size + 7]:  # its size is wrong, and so may be all of it
-                tally.refused["bad_object"] += 1
-                tally.refused["lost_bytes"] += 4
-                at += 4
+                at = lost(tally.refused, "bad_object", at, at + 4)
                 continue
             yield from _opened(stream[at : at + size], tally)
             at += size

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from drivers.can import CanFrame, CanSettings, FrameDecoder, decoder_of
+from drivers.logs.log_file import LogFile
 from drivers.logs.receive_clock import MICROSECOND, on_clock
 from drivers.sample import LinkReport, Sample
 
@@ -66,7 +67,7 @@ def lines(file: BinaryIO, tally: Tally) -> Iterator[bytes]:
         tally.refused["truncated_file"] += 1
 
 
-class CanLogReader:
+class CanLogReader(LogFile):
     """The samples of one recording, on its own clock; see :class:`drivers.logs.LogReader`.
 
     Every bus of the recording is replayed as the one link, each reassembled for itself, whatever it was
@@ -92,31 +93,26 @@ class CanLogReader:
     """
 
     def __init__(self, path: Path, link_name: str, settings: CanSettings, source: FrameSource) -> None:
-        self._path = path
         self._link = link_name
         self._settings = settings
         self._source = source
-        self._size = path.stat().st_size
         self._file: BinaryIO | None = None
-        self._begin()
+        path.stat()  # now, rather than at the first frame
+        super().__init__(path)
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
+        """Take decoders that have heard nothing."""
         self._decoders: dict[str, FrameDecoder] = {}
         self._census = decoder_of(self._link, self._settings).census()
         self._tally = Tally()
         self._samples = 0
 
     @property
-    def size(self) -> int:
-        """Bytes of the file, as it lies on the disk."""
-        return self._size
-
-    @property
     def position(self) -> int:
-        """Bytes of the file read so far: ``position / size`` is the progress."""
+        """Bytes of the file read so far, as it lies on the disk: of a gzipped one fewer than were unpacked."""
         if self._file is None:
             return 0
-        return self._size if self._file.closed else self._file.tell()
+        return self.size if self._file.closed else self._file.tell()
 
     def report(self) -> LinkReport:
         """Return the totals of the iteration so far."""
@@ -136,22 +132,20 @@ class CanLogReader:
         """Return how many messages of each kind were met, also of those that no one wants."""
         return self._census.kinds()
 
-    def __iter__(self) -> Iterator[Sample]:
-        """Yield the samples in the order of the recording; damage is counted and ends nothing."""
-        self._begin()
-        with self._path.open("rb") as file:
-            self._file = file
-            for time_ns, (channel, frame) in on_clock(self._stamped(file), self._tally.refused):
-                decoder = self._decoders.get(channel)
-                if decoder is None:
-                    if len(self._decoders) == _MOST_CHANNELS:
-                        self._tally.refused["too_many_channels"] += 1
-                        continue
-                    decoder = self._decoders[channel] = decoder_of(self._link, self._settings)
-                self._census.count(frame)
-                for sample in decoder.decode(frame, time_ns):
-                    self._samples += 1
-                    yield sample
+    def read(self, file: BinaryIO) -> Iterator[Sample]:
+        """Yield the samples in the order of the recording."""
+        self._file = file
+        for time_ns, (channel, frame) in on_clock(self._stamped(file), self._tally.refused):
+            decoder = self._decoders.get(channel)
+            if decoder is None:
+                if len(self._decoders) == _MOST_CHANNELS:
+                    self._tally.refused["too_many_channels"] += 1
+                    continue
+                decoder = self._decoders[channel] = decoder_of(self._link, self._settings)
+            self._census.count(frame)
+            for sample in decoder.decode(frame, time_ns):
+                self._samples += 1
+                yield sample
 
     def _stamped(self, file: BinaryIO) -> Iterator[tuple[int, tuple[str, CanFrame]]]:
         for time_ns, channel, frame in self._source(file, self._tally):

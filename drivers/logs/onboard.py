@@ -6,13 +6,21 @@ handler makes readings of its fields, what is implausible is counted, and the re
 
 from __future__ import annotations
 
+import mmap
+from abc import abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import islice
+from pathlib import Path
+from statistics import median_low
+from typing import BinaryIO, Protocol
 
+from drivers.logs.log_file import LogFile, mapped
 from drivers.plausibility import implausible
 from drivers.sample import AnyReading, LinkReport, Sample
 
 Fields = Mapping[str, float]
+ENOUGH_FIXES = 5
 
 
 class Notes:
@@ -84,3 +92,84 @@ class Tally:
             opened=1,
             clock=clock,
         )
+
+
+class Messages(Protocol):
+    """The messages of a log under reading."""
+
+    @property
+    def faults(self) -> Counter[str]:
+        """What was damaged, by kind."""
+        ...
+
+    @property
+    def kinds(self) -> Counter[str]:
+        """Messages by name."""
+        ...
+
+    @property
+    def position(self) -> int:
+        """Bytes read."""
+        ...
+
+
+class OnboardReader(LogFile):
+    """Reads a log that an autopilot wrote; see :class:`drivers.logs.LogReader`.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    link_name : str
+        What the samples name as their link.
+
+    Attributes
+    ----------
+    log : Messages or None
+        What :meth:`samples` reads, once it has begun.
+    base : int or None
+        Unix time less time since boot, ns, where a receiver knew it; without it the clock is the time since boot.
+    """
+
+    clock = ""
+    """What the log's clock is where ``base`` is known."""
+
+    def __init__(self, path: Path, link_name: str) -> None:
+        self._link = link_name
+        self.log: Messages | None = None
+        super().__init__(path)
+
+    def begin(self) -> None:
+        """Forget the log, and what was counted."""
+        self.log = None
+        self.base: int | None = None
+        self.tally = Tally(self._link)
+
+    @property
+    def position(self) -> int:
+        """Bytes read so far."""
+        return 0 if self.log is None else self.log.position
+
+    def read(self, file: BinaryIO) -> Iterator[Sample]:
+        """Yield the samples in the order of the log."""
+        for data in mapped(file):
+            yield from self.samples(data)
+
+    @abstractmethod
+    def samples(self, data: mmap.mmap) -> Iterator[Sample]:
+        """Yield the samples of a log that holds anything."""
+
+    def report(self) -> LinkReport:
+        """Return the totals of the iteration so far."""
+        damage = Counter[str]() if self.log is None else self.log.faults
+        return self.tally.report(damage, "boot" if self.base is None else self.clock)
+
+    def kinds(self) -> dict[str, int]:
+        """Return how many messages of each kind were met, wanted or not."""
+        return {} if self.log is None else dict(self.log.kinds)
+
+
+def settled(bases: Iterable[int]) -> int | None:
+    """Return the middle one of what the first fixes say; ``None`` where there is none."""
+    first = list(islice(bases, ENOUGH_FIXES))
+    return median_low(first) if first else None

@@ -11,7 +11,9 @@ import mmap
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
+from drivers.logs.log_file import LogFile, lost, mapped
 from drivers.logs.receive_clock import LARGEST_STAMP, ReceiveClock
 from drivers.mavlink.decode import Decoder
 from drivers.mavlink.dialect import LAYOUTS
@@ -23,7 +25,7 @@ from drivers.sample import LinkReport, Sample
 STAMP = 8
 
 
-class TlogReader:
+class TlogReader(LogFile):
     """Reads a .tlog through the same decoder as the live link; see :class:`drivers.logs.LogReader`.
 
     Parameters
@@ -37,42 +39,22 @@ class TlogReader:
     """
 
     def __init__(self, path: Path, link_name: str, settings: MavlinkSettings) -> None:
-        self._path = path
         self._link = link_name
         self._settings = settings
-        self._begin()
+        super().__init__(path)
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
+        """Take a decoder that has heard nothing."""
         self._decoder = Decoder(self._link, self._settings)
         self._sequences = Sequences()
         self._clock: ReceiveClock | None = None
         self._faults: Counter[str] = Counter()
         self._kinds: Counter[int] = Counter()
-        self._position = 0
         self._ahead: tuple[int, int | None] = (-1, None)  # where the next entry begins, and its stamp
 
-    @property
-    def size(self) -> int:
-        """Bytes of the file."""
-        return self._path.stat().st_size
-
-    @property
-    def position(self) -> int:
-        """Bytes read so far."""
-        return self._position
-
-    def __iter__(self) -> Iterator[Sample]:
-        """Read from the start, in order of arrival.
-
-        Raises
-        ------
-        OSError
-            The file cannot be read.
-        """
-        self._begin()
-        if self.size == 0:  # an empty file cannot be mapped
-            return
-        with self._path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+    def read(self, file: BinaryIO) -> Iterator[Sample]:
+        """Yield the samples in order of arrival."""
+        for data in mapped(file):
             yield from self._samples(data)
 
     def _samples(self, data: mmap.mmap) -> Iterator[Sample]:
@@ -81,10 +63,10 @@ class TlogReader:
         while at < len(data):
             frame = frame_at(data, at + STAMP)
             if not isinstance(frame, Frame) or (frame.layout is None and not _followed(data, at, frame)):
-                at = self._position = self._resynchronise(data, at, frame)
+                at = self.done = self._resynchronise(data, at, frame)
                 continue
             received = self._received(data, at, frame)
-            at = self._position = at + STAMP + len(frame.raw)
+            at = self.done = at + STAMP + len(frame.raw)
             kinds[frame.identifier] += 1
             self._number(frame, received)
             if frame.identifier in wanted:
@@ -111,16 +93,15 @@ class TlogReader:
 
     def _resynchronise(self, data: mmap.mmap, at: int, fault: Frame | Fault) -> int:
         """Return where the next good entry starts; count the stretch once, and its bytes."""
-        self._faults[fault if isinstance(fault, Fault) else Fault.UNKNOWN] += 1
         search = at + STAMP + 1
+        end = len(data)
         while found := MARKERS.search(data, search):
             frame = frame_at(data, found.start())
             if isinstance(frame, Frame) and frame.layout is not None:
-                self._faults["lost_bytes"] += found.start() - STAMP - at
-                return found.start() - STAMP
+                end = found.start() - STAMP
+                break
             search = found.start() + 1
-        self._faults["lost_bytes"] += len(data) - at
-        return len(data)
+        return lost(self._faults, fault if isinstance(fault, Fault) else Fault.UNKNOWN, at, end)
 
     def report(self) -> LinkReport:
         """Return the totals of the iteration so far."""

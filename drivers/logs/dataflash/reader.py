@@ -10,18 +10,15 @@ from __future__ import annotations
 import mmap
 from collections import Counter
 from collections.abc import Iterator
-from itertools import islice
-from pathlib import Path
-from statistics import median_low
 
 from drivers.logs.dataflash.layout import FMT, HEADER, HEADER_LENGTH, Layout, Layouts
 from drivers.logs.dataflash.records import FIX_3D, USUAL, handlers, source_of
-from drivers.logs.onboard import Fields, Handler, Tally
+from drivers.logs.log_file import lost
+from drivers.logs.onboard import Fields, Handler, OnboardReader, settled
 from drivers.logs.receive_clock import LARGEST_STAMP, on_clock
-from drivers.sample import LinkReport, Sample
+from drivers.sample import Sample
 
 DEFINITIONS = frozenset({"FMT", "FMTU", "UNIT", "MULT"})
-ENOUGH_FIXES = 5
 GPS_EPOCH = 315_964_800  # Unix seconds of 1980-01-06
 WEEK = 604_800
 FIRST_WEEK = 1000  # 1999; a smaller one comes from a receiver that does not know the date
@@ -80,97 +77,50 @@ class Log:
 
     def _resynchronise(self, at: int) -> int:
         """Return where the next good message starts."""
-        self.faults["bad_header"] += 1
         found = self._data.find(HEADER, at + 1)
         while found >= 0 and self._at(found) is None:
             found = self._data.find(HEADER, found + 1)
-        end = found if found >= 0 else len(self._data)
-        self.faults["lost_bytes"] += end - at
-        return end
+        return lost(self.faults, "bad_header", at, found if found >= 0 else len(self._data))
 
 
-class DataflashReader:
-    """Reads a .bin; see :class:`drivers.logs.LogReader`.
+class DataflashReader(OnboardReader):
+    """Reads a .bin."""
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    link_name : str
-        What the samples name as their link.
-    """
+    clock = "gps"
 
-    def __init__(self, path: Path, link_name: str) -> None:
-        self._path = path
-        self._link = link_name
-        self._begin()
-
-    def _begin(self) -> None:
-        self._log: Log | None = None
-        self._tally = Tally(self._link)
+    def begin(self) -> None:
+        """Forget the log, and what its messages have said."""
+        super().begin()
         self._handlers: dict[str, Handler] = handlers()
-        self._on_gps_time = False
 
-    @property
-    def size(self) -> int:
-        """Bytes of the file."""
-        return self._path.stat().st_size
-
-    @property
-    def position(self) -> int:
-        """Bytes read so far."""
-        return self._log.position if self._log else 0
-
-    def __iter__(self) -> Iterator[Sample]:
-        """Read from the start, in the order of the log.
-
-        Raises
-        ------
-        OSError
-            The file cannot be read.
-        """
-        self._begin()
-        if self.size == 0:  # an empty file cannot be mapped
-            return
-        with self._path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            base = unix_at_boot(data)
-            self._on_gps_time = base is not None
-            self._log = Log(data)
-            for time, (layout, at) in on_clock(self._wanted(self._log, data), self._tally.faults):
-                yield from self._samples_of(layout, data, at, time + (base or 0))
+    def samples(self, data: mmap.mmap) -> Iterator[Sample]:
+        """Yield the samples in the order of the log."""
+        self.base = unix_at_boot(data)
+        self.log = log = Log(data)
+        for time, (layout, at) in on_clock(self._wanted(log, data), self.tally.faults):
+            fields = log.layouts.ready(layout).fields(data, at)
+            yield from self._samples_of(layout, fields, time + (self.base or 0))
 
     def _wanted(self, log: Log, data: mmap.mmap) -> Iterator[tuple[int, tuple[Layout, int]]]:
         """Yield the messages that have a handler, with their stamps."""
         for layout, at in log:
             stamp = layout.stamp(data, at) if layout.name in self._handlers else None
             if stamp is None:
-                self._tally.ignored += 1
+                self.tally.ignored += 1
             else:
                 yield min(stamp, LARGEST_STAMP // 2), (layout, at)
 
-    def _samples_of(self, layout: Layout, data: mmap.mmap, at: int, time: int) -> Iterator[Sample]:
-        assert self._log is not None
-        fields = self._log.layouts.ready(layout).fields(data, at)
+    def _samples_of(self, layout: Layout, fields: Fields, time: int) -> Iterator[Sample]:
         source = source_of(layout.name, fields)
         if source is None:
-            self._tally.ignored += 1
+            self.tally.ignored += 1
             return
-        yield from self._tally.samples_of(source, self._handlers[source], fields, time, time)
-
-    def report(self) -> LinkReport:
-        """Return the totals of the iteration so far."""
-        damage = self._log.faults if self._log else Counter[str]()
-        return self._tally.report(damage, "gps" if self._on_gps_time else "boot")
-
-    def kinds(self) -> dict[str, int]:
-        """Return how many messages of each kind were met, wanted or not."""
-        return dict(self._log.kinds) if self._log else {}
+        yield from self.tally.samples_of(source, self._handlers[source], fields, time, time)
 
 
 def unix_at_boot(data: mmap.mmap) -> int | None:
     """Return Unix time less time since boot (ns) by the first fixes of a log, ``None`` where there is none."""
-    bases = list(islice(_bases(data), ENOUGH_FIXES))
-    return median_low(bases) if bases else None
+    return settled(_bases(data))
 
 
 def _bases(data: mmap.mmap) -> Iterator[int]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 import msgspec
@@ -15,6 +14,7 @@ from mcap.records import Channel, Chunk, McapRecord, Message
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
 from drivers.foreign import MalformedSample, decode
+from drivers.logs.log_file import LogFile, lost
 from drivers.logs.recording.writer import ENCODING, LINK, ORDER, SOURCE, TAKEN, TOPIC
 from drivers.sample import LinkReport, Sample
 
@@ -61,7 +61,7 @@ class Entry(NamedTuple):
         return self.topic.startswith(f"{TOPIC}/")
 
 
-class RecordingReader:
+class RecordingReader(LogFile):
     """Reads an .mcap of samples; see :class:`drivers.logs.LogReader`.
 
     A damaged chunk is left out and counted; where the container itself is broken or cut off, the reading ends.
@@ -72,38 +72,18 @@ class RecordingReader:
         The file.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._begin()
-
-    def _begin(self) -> None:
+    def begin(self) -> None:
+        """Forget the channels, and what was counted."""
         self._channels: dict[int, Channel] = {}
         self._kinds: Counter[str] = Counter()
         self._malformed: Counter[str] = Counter()
         self._ignored = 0
         self._samples = 0
-        self._position = 0
         self._received = 0
 
-    @property
-    def size(self) -> int:
-        """Bytes of the file."""
-        return self._path.stat().st_size
-
-    @property
-    def position(self) -> int:
-        """Bytes read so far."""
-        return self._position
-
-    def __iter__(self) -> Iterator[Sample]:
-        """Read from the start, in the order of the file.
-
-        Raises
-        ------
-        OSError
-            The file cannot be read.
-        """
-        for entry in self.entries():
+    def read(self, file: BinaryIO) -> Iterator[Sample]:
+        """Yield the samples in the order of the file."""
+        for entry in self._entries(file):
             if not entry.is_reading:
                 self._ignored += 1
                 continue
@@ -121,15 +101,18 @@ class RecordingReader:
         OSError
             The file cannot be read.
         """
-        self._begin()
-        with self._path.open("rb") as file:
-            for record in self._records(file):
-                if isinstance(record, Channel):
-                    self._channels[record.id] = record
-                elif isinstance(record, Message):
-                    entry = self._entry(record)
-                    if entry is not None:
-                        yield entry
+        self.begin()
+        with self.path.open("rb") as file:
+            yield from self._entries(file)
+
+    def _entries(self, file: BinaryIO) -> Iterator[Entry]:
+        for record in self._records(file):
+            if isinstance(record, Channel):
+                self._channels[record.id] = record
+            elif isinstance(record, Message):
+                entry = self._entry(record)
+                if entry is not None:
+                    yield entry
 
     def _records(self, file: BinaryIO) -> Iterator[McapRecord]:
         """Yield the records, those in chunks one by one."""
@@ -138,24 +121,22 @@ class RecordingReader:
             try:
                 record = next(records, None)
             except _BROKEN:
-                self._malformed["broken_container"] += 1
-                self._malformed["lost_bytes"] += self.size - self._position
+                lost(self._malformed, "broken_container", self.done, self.size)
                 return
             if record is None:
-                self._position = self.size
+                self.done = self.size
                 return
             if isinstance(record, Chunk):
                 yield from self._unpacked(record)
             else:
                 yield record
-            self._position = file.tell()
+            self.done = file.tell()
 
     def _unpacked(self, chunk: Chunk) -> list[McapRecord]:
         try:
             return breakup_chunk(chunk, validate_crc=True)
         except _BROKEN:
-            self._malformed["broken_chunk"] += 1
-            self._malformed["lost_bytes"] += len(chunk.data)
+            lost(self._malformed, "broken_chunk", 0, len(chunk.data))
             return []
 
     def _entry(self, message: Message) -> Entry | None:

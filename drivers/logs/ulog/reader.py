@@ -13,15 +13,13 @@ import re
 import struct
 from collections import Counter
 from collections.abc import Iterator
-from itertools import islice
-from pathlib import Path
-from statistics import median_low
 
-from drivers.logs.onboard import Fields, Handler, Tally
+from drivers.logs.log_file import lost
+from drivers.logs.onboard import Fields, Handler, OnboardReader, settled
 from drivers.logs.receive_clock import LARGEST_STAMP, on_clock
 from drivers.logs.ulog.layout import Formats, Topic
 from drivers.logs.ulog.records import BLENDED, FIX_3D, RAW, handlers
-from drivers.sample import LinkReport, Sample
+from drivers.sample import Sample
 
 MAGIC = b"ULog\x01\x12\x35"
 HEADER_LENGTH = 16
@@ -34,7 +32,6 @@ LONGEST = MESSAGE_HEADER.size + 2**16
 FLAGS = struct.Struct("<8s8s3Q")
 APPENDED = 1
 
-ENOUGH_FIXES = 5
 EARLIEST_UTC = (
     946_684_800_000_000  # µs: 2000; an earlier one comes from a receiver that does not know the date
 )
@@ -118,15 +115,13 @@ class Log:
 
         One that was cut off where data were appended (by a fault handler, after a crash) is no damage in the rest.
         """
-        self.faults["bad_header"] += 1
         search = at + 1
         while candidate := CANDIDATES.search(self._data, search):
             if self._convincing(candidate.start()):
                 break
             search = candidate.start() + 1
         found = candidate.start() if candidate else len(self._data)
-        self.faults["lost_bytes"] += found - at
-        return found
+        return lost(self.faults, "bad_header", at, found)
 
     def _convincing(self, at: int) -> bool:
         """Whether bytes found after damage are messages again.
@@ -174,62 +169,29 @@ class Log:
             self.faults["unknown_flags"] += 1
 
 
-class UlogReader:
-    """Reads a .ulg; see :class:`drivers.logs.LogReader`.
+class UlogReader(OnboardReader):
+    """Reads a .ulg."""
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    link_name : str
-        What the samples name as their link.
-    """
+    clock = "utc"
 
-    def __init__(self, path: Path, link_name: str) -> None:
-        self._path = path
-        self._link = link_name
-        self._begin()
-
-    def _begin(self) -> None:
-        self._log: Log | None = None
-        self._tally = Tally(self._link)
+    def begin(self) -> None:
+        """Forget the log, and what its messages have said."""
+        super().begin()
         self._handlers: dict[tuple[str, int], Handler | None] = {}
         self._blended = False
-        self._on_utc = False
 
-    @property
-    def size(self) -> int:
-        """Bytes of the file."""
-        return self._path.stat().st_size
-
-    @property
-    def position(self) -> int:
-        """Bytes read so far."""
-        return self._log.position if self._log else 0
-
-    def __iter__(self) -> Iterator[Sample]:
-        """Read from the start, in the order of the log.
-
-        Raises
-        ------
-        OSError
-            The file cannot be read.
-        """
-        self._begin()
-        if self.size == 0:  # an empty file cannot be mapped
-            return
-        with self._path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            base, self._blended = unix_at_boot(data)
-            self._on_utc = base is not None
-            self._log = Log(data)
-            for time, (topic, fields) in on_clock(self._wanted(self._log), self._tally.faults):
-                yield from self._samples_of(topic, fields, time, base or 0)
+    def samples(self, data: mmap.mmap) -> Iterator[Sample]:
+        """Yield the samples in the order of the log."""
+        self.base, self._blended = unix_at_boot(data)
+        self.log = log = Log(data)
+        for time, (topic, fields) in on_clock(self._wanted(log), self.tally.faults):
+            yield from self._samples_of(topic, fields, time, self.base or 0)
 
     def _wanted(self, log: Log) -> Iterator[tuple[int, tuple[Topic, Fields]]]:
         """Yield the messages that have a handler, with their stamps."""
         for topic, body in log:
             if self._handler(topic) is None:
-                self._tally.ignored += 1
+                self.tally.ignored += 1
                 continue
             fields = topic.fields(body)
             yield min(int(fields["timestamp"]), LARGEST_STAMP // 2), (topic, fields)
@@ -250,16 +212,7 @@ class UlogReader:
         measured, stamp = int(fields.get("timestamp_sample", 0)), int(fields["timestamp"])
         age = (stamp - measured) * 1_000 if 0 < measured <= stamp else 0
         times = max(0, received - age) + base, received + base
-        yield from self._tally.samples_of(topic.name, handler, fields, *times)
-
-    def report(self) -> LinkReport:
-        """Return the totals of the iteration so far."""
-        damage = self._log.faults if self._log else Counter[str]()
-        return self._tally.report(damage, "utc" if self._on_utc else "boot")
-
-    def kinds(self) -> dict[str, int]:
-        """Return how many messages of each topic were met, wanted or not."""
-        return dict(self._log.kinds) if self._log else {}
+        yield from self.tally.samples_of(topic.name, handler, fields, *times)
 
 
 def unix_at_boot(data: mmap.mmap) -> tuple[int | None, bool]:
@@ -267,9 +220,8 @@ def unix_at_boot(data: mmap.mmap) -> tuple[int | None, bool]:
 
     The first is ``None`` where no receiver knew the time.
     """
-    blended = list(islice(_bases(data, BLENDED), ENOUGH_FIXES))
-    raw = [] if blended else list(islice(_bases(data, RAW), ENOUGH_FIXES))
-    return (median_low(blended or raw) if blended or raw else None), bool(blended)
+    blended = settled(_bases(data, BLENDED))
+    return (settled(_bases(data, RAW)), False) if blended is None else (blended, True)
 
 
 def _bases(data: mmap.mmap, name: str) -> Iterator[int]:
