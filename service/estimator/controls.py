@@ -218,15 +218,15 @@ class Controls:
 
     def _take_wheels(self, sample: Sample, wheels: Wheels) -> None:
         """Feed the speed that all speed sensors make together, where nothing better speaks."""
-        fused = wheels.take(sample, self._turn.rate(sample.time))
+        fused = wheels.take(sample, self._turn.rate)
         if fused is None or self.speed_from not in ("auto", SENSORS):
             return
         if not self._speaker.accepts(Source(SENSORS_RANK, "", SENSORS), sample.time):
             return
         if not isinstance(self._distance, RateTrack):
             self._distance = RateTrack()
-        self.out_of_order += not self._distance.append(sample.time, fused.speed)
-        self._doubt.append(sample.time, fused.density)
+        self.out_of_order += not self._distance.append(fused.time, fused.speed)
+        self._doubt.append(fused.time, fused.density)
 
     def _take_odometer(self, sample: Sample, reading: Odometer) -> None:
         if not reading.distance:

@@ -8,7 +8,7 @@ make together (a wheel that slips or is locked) is left out while it does.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from drivers.sample import Sample
@@ -30,8 +30,9 @@ ENOUGH = 3
 
 
 class Fused(NamedTuple):
-    """The speed of the centre (m/s), and the variance of the distance that it leaves open, m² a second."""
+    """When (nanoseconds), the speed of the centre (m/s), and the variance of the distance left open, m² a second."""
 
+    time: int
     speed: float
     density: float
 
@@ -73,12 +74,19 @@ class Wheels:
         """Say whether a sensor's reading is in ``sample``."""
         return any(self._matching(sample))
 
-    def take(self, sample: Sample, yaw_rate: float) -> Fused | None:
-        """Take a reading, with the yaw rate (rad/s) of its time; return the speed by all that were heard lately."""
-        fresh = False
+    def take(self, sample: Sample, yaw_rate: Callable[[int], float]) -> Fused | None:
+        """Take a reading; return the speed by all that were heard lately, as of that reading.
+
+        Parameters
+        ----------
+        yaw_rate : callable
+            Says it of a time (nanoseconds), rad/s.
+        """
+        fresh: int | None = None
         for place in self._matching(sample):
-            fresh |= self._take(place, sample, yaw_rate)
-        return self._fused(sample.time) if fresh else None
+            time = self._take(place, sample, yaw_rate)
+            fresh = fresh if time is None else time
+        return None if fresh is None else self._fused(fresh)
 
     def _matching(self, sample: Sample) -> list[int]:
         """Return the sensors that a sample is for: the first, or one for each wheel that is told apart."""
@@ -89,7 +97,8 @@ class Wheels:
         whole = found.get(None)
         return list(found.values()) if whole is None or whole != min(found.values()) else [whole]
 
-    def _take(self, place: int, sample: Sample, yaw_rate: float) -> bool:
+    def _take(self, place: int, sample: Sample, yaw_rate: Callable[[int], float]) -> int | None:
+        """Take what a sample says to one sensor; return when that was true, ``None`` if it says nothing."""
         settings = self._sensors[place]
         key = (place, sample.link, sample.source, getattr(sample.reading, "index", None))
         if key not in self._speedometers:
@@ -98,7 +107,7 @@ class Wheels:
         said = self._speedometers[key].read(time, sample.reading)
         if isinstance(said, str):
             self.unusable += 1
-            return False
+            return None
         right = 0.0 if settings.lever is None else settings.lever[1]
         claimed = said.sigma if settings.claims else None
         sigma = max((s for s in (settings.sigma, claimed) if s is not None), default=DEFAULT_SIGMA)
@@ -106,8 +115,8 @@ class Wheels:
         interval = (time - last.time) / SECOND if last is not None else 0.0
         alike = CORRELATION if settings.correlation_s is None else settings.correlation_s
         duration = max(alike, min(GAP / SECOND, interval))
-        self._heard[key] = _Heard(time, said.speed + right * yaw_rate, sigma * sigma, duration)
-        return True
+        self._heard[key] = _Heard(time, said.speed + right * yaw_rate(time), sigma * sigma, duration)
+        return time
 
     def _fused(self, time: int) -> Fused:
         heard = [one for one in self._heard.values() if abs(time - one.time) <= GAP]
@@ -117,7 +126,7 @@ class Wheels:
         total = math.fsum(weights)
         speed = math.fsum(w * one.speed for w, one in zip(weights, heard, strict=True)) / total
         duration = math.fsum(w * one.duration for w, one in zip(weights, heard, strict=True)) / total
-        return Fused(speed, duration / total)
+        return Fused(time, speed, duration / total)
 
     def _agreeing(self, heard: list[_Heard]) -> list[_Heard]:
         """Return those that lie near the median of all."""
