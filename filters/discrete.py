@@ -155,7 +155,7 @@ class DiscreteBayesFilter(Generic[State]):
         """
         logs = np.array(log_likelihoods, np.float64, ndmin=1)
         self._require_one_each("log likelihoods", logs)
-        if np.isnan(logs).any() or (logs == math.inf).any():
+        if not logs.max() < math.inf:  # the largest of what holds a NaN is one
             raise ValueError(f"discrete filter: log likelihoods must be below infinity, got {logs.tolist()}")
         return self._weigh(logs)
 

@@ -132,13 +132,20 @@ class GaussianBank:
         ValueError
             Numbers or shapes that make no Gaussian of these dimensions; the member is unchanged then.
         """
+        self._set(slice(member, member + 1), mean, covariance)
+
+    def set_all(self, mean: ArrayLike, covariance: ArrayLike) -> None:
+        """Have every member hold this Gaussian from now on; see :meth:`set`."""
+        self._set(slice(None), mean, covariance)
+
+    def _set(self, members: slice, mean: ArrayLike, covariance: ArrayLike) -> None:
         belief = checked_gaussian("bank", mean, covariance)
         if belief.mean.shape != (len(self.names),):
             raise ValueError(f"bank: a mean of {', '.join(self.names)} is needed, got {belief.mean.shape}")
-        self.mean[member] = belief.mean
-        self.mean[member, 2] = (belief.mean[2] + math.pi) % (2.0 * math.pi) - math.pi
-        self.covariance[member] = belief.covariance
-        self.live[member] = True
+        belief.mean[2] = (belief.mean[2] + math.pi) % (2.0 * math.pi) - math.pi
+        self.mean[members] = belief.mean
+        self.covariance[members] = belief.covariance
+        self.live[members] = True
 
     def predict(
         self,

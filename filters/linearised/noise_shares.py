@@ -111,8 +111,7 @@ class NoiseShares:
 
     def begin(self, mean: Matrix, covariance: Matrix) -> None:
         """Have every Gaussian go on from this one."""
-        for member in range(self._prior.size):
-            self.bank.set(member, mean, covariance)
+        self.bank.set_all(mean, covariance)
 
     def stop(self) -> None:
         """Have them hold nothing until :meth:`begin`."""

@@ -22,6 +22,7 @@ import numpy as np
 
 from filters.extended_kalman import Transition
 from filters.kalman import Matrix
+from filters.kernels.rolling import linearise
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 
@@ -49,23 +50,11 @@ class LinearisedUnicycle:
         """Linearise the motion at ``mean``; see :class:`filters.extended_kalman.LinearisedMotion`."""
         if not all(map(math.isfinite, control)):
             raise ValueError(f"unicycle: every number of the control must be finite, got {control}")
-        bias, scale = float(mean[3]), float(mean[4])
-        distance, turn = scale * control.distance, control.turn - bias * duration
-        middle = float(mean[2]) + 0.5 * turn
-        sine, cosine = math.sin(middle), math.cos(middle)
-
-        moved = mean.copy()
-        moved[:3] += (distance * cosine, distance * sine, turn)
-
-        by_turn = np.array([-0.5 * distance * sine, 0.5 * distance * cosine, 1.0])
-        by_distance = np.array([cosine, sine, 0.0])
-        jacobian = np.eye(mean.size)
-        jacobian[:2, 2] = (-distance * sine, distance * cosine)
-        jacobian[:3, 3] = -duration * by_turn
-        jacobian[:3, 4] = control.distance * by_distance
-
-        distance_variance, turn_variance = self._motion.noise_variances(control, duration)
-        noise = (jacobian * (self._walk_variances * duration)) @ jacobian.T
-        noise[:3, :3] += distance_variance * np.outer(by_distance, by_distance)
-        noise[:3, :3] += turn_variance * np.outer(by_turn, by_turn)
+        size = mean.size
+        moved, jacobian, noise = np.empty(size), np.zeros((size, size)), np.zeros((size, size))
+        variances = self._motion.noise_variances(control, duration)
+        walks, start = self._walk_variances, np.ascontiguousarray(mean, np.float64)
+        linearise.direct(
+            start, control.distance, control.turn, duration, *variances, walks, moved, jacobian, noise
+        )
         return Transition(moved, jacobian, noise)

@@ -263,6 +263,8 @@ class Estimator:
     def _find(self, now: int, afforded: int) -> None:
         """Let the search for the place go on, and begin anew where it has found one."""
         assert self._fusion.time is not None
+        if self._search.idle:
+            return
         blind = self._search.blind
         if not blind and self._trust is not None and self._trust.decides:
             return

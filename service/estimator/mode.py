@@ -220,8 +220,7 @@ class Mode:
             if (distances < FAR).all():
                 return
         mean, covariance = gaussian_of(self._belief, self._motion.conditional_variances)
-        for member in range(2):
-            self._bank.set(member, mean, covariance)
+        self._bank.set_all(mean, covariance)
 
 
 def _slip_variance(distance: float, duration: float) -> float:

@@ -260,6 +260,12 @@ class Search:
         return expected_log_evidence(map(float, variances))
 
     @property
+    def idle(self) -> bool:
+        """Whether there is nothing to search for."""
+        searching = self.blind or self._quest is not None or self._rival is not None
+        return not searching and not (self._watching and self.alarmed)
+
+    @property
     def alarmed(self) -> bool:
         """Whether every kind of absolute sensor says that most of the belief is wrong."""
         shares = self._recovery.shares

@@ -82,7 +82,23 @@ class Track:
 
     def totals(self, times: Sequence[int]) -> list[float]:
         """Return the total at each of ``times``, all from one beginning."""
-        return [self._at(time)[0] for time in times]
+        known, totals = self._times, self._totals
+        if not known:
+            return [0.0] * len(times)
+        first, last = known[0], known[-1]
+        found: list[float] = []
+        for time in times:  # as _at has it, without the seconds that nothing is known of
+            if time >= last:
+                rate, longest = self._held_rate or self._hold()
+                found.append(totals[-1] + rate * min(time - last, longest))
+            elif time <= first:
+                found.append(totals[0])
+            else:
+                after = bisect_right(known, time)
+                begin, total = known[after - 1], totals[after - 1]
+                share = (time - begin) / (known[after] - begin)
+                found.append(total + share * (totals[after] - total))
+        return found
 
     def rate(self, time: int) -> float:
         """Return the mean rate over :data:`SPEED_WINDOW` about ``time``, per second."""
