@@ -15,7 +15,7 @@ from typing import NamedTuple
 from drivers.can import database, units
 from drivers.can.database import DamagedFrame, DbcMessage
 from drivers.can.decoder import Filter
-from drivers.can.frame import CanFrame
+from drivers.can.frame import LARGEST_EXTENDED, LARGEST_STANDARD, CanFrame
 from drivers.can.settings import CanSettings, SignalSettings
 from drivers.can.traffic import IdentifierTraffic
 from drivers.can.wheels import FASTEST, Counters, Rolled
@@ -201,7 +201,7 @@ class DbcDecoder:
     def filters(self) -> list[Filter]:
         """What an interface has to let through."""
         exact = [
-            Filter(identifier, 0x1FFFFFFF if extended else 0x7FF, extended)
+            Filter(identifier, LARGEST_EXTENDED if extended else LARGEST_STANDARD, extended)
             for extended, identifier in self._readers
         ]
         return [*exact, *(Filter(group, _mask_of(group), True) for group in self._groups)]

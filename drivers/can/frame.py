@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+LARGEST_STANDARD = 0x7FF
+LARGEST_EXTENDED = 0x1FFFFFFF
+"""Identifiers of 11 and of 29 bits; as masks: what of a word is the identifier."""
+
 
 class CanFrame(NamedTuple):
     """A data frame.

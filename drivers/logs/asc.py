@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 from typing import BinaryIO
 
 from drivers.can import CanFrame
+from drivers.can.frame import LARGEST_EXTENDED, LARGEST_STANDARD
 from drivers.logs.canlog import LoggedFrame, Tally, lines
 
 _SECOND = 1_000_000_000
@@ -34,8 +35,6 @@ _OF_A_FRAME = re.compile(rb"(?:\d{1,3}\s+\S{1,128}\s+(?:Rx|Tx)|CANFD)\b", re.I)
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _GERMAN = {"mär": "mar", "mrz": "mar", "mai": "may", "okt": "oct", "dez": "dec"}
 _FORMATS = ("%m %d %I:%M:%S.%f %p %Y", "%m %d %I:%M:%S %p %Y", "%m %d %H:%M:%S.%f %Y", "%m %d %H:%M:%S %Y")
-_LARGEST = 0x1FFFFFFF
-_LARGEST_STANDARD = 0x7FF
 _CLASSIC_BYTES, _FLEXIBLE_BYTES = 8, 64
 
 
@@ -99,7 +98,7 @@ def frame_of(rest: bytes, base: int) -> tuple[str, CanFrame | None] | None:
     identifier, extended = int(match["identifier"], base), bool(match["extended"])
     length = int(match["length"]) if flexible else min(_CLASSIC_BYTES, int(match["length"], base))
     values = [int(value, base) for value in match["data"].split()[:length]]
-    fits = identifier <= (_LARGEST if extended else _LARGEST_STANDARD) and length <= _FLEXIBLE_BYTES
+    fits = identifier <= (LARGEST_EXTENDED if extended else LARGEST_STANDARD) and length <= _FLEXIBLE_BYTES
     if not fits or len(values) < length or max(values, default=0) > 0xFF:
         raise ValueError("bad_line")
     return channel, CanFrame(identifier, bytes(values), extended, flexible is not None)

@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from typing import BinaryIO, NamedTuple
 
 from drivers.can import CanFrame
+from drivers.can.frame import LARGEST_EXTENDED
 from drivers.logs.canlog import LoggedFrame, Tally
 from drivers.logs.log_file import lost
 
@@ -35,7 +36,6 @@ _FD_TYPE, _FD_64_TYPE = 100, 101
 _PLAIN, _ZLIB = 0, 2
 _TEN_MICROSECONDS = 1
 _EXTENDED = 0x80000000
-_IDENTIFIER = 0x1FFFFFFF
 _REMOTE = 0x80
 _REMOTE_64 = 0x10
 
@@ -175,7 +175,7 @@ def _frame(found: _Object) -> tuple[int, CanFrame | None] | None:
     if remote:
         return channel, None
     return channel, CanFrame(
-        identifier & _IDENTIFIER, bytes(data[:length]), bool(identifier & _EXTENDED), flexible
+        identifier & LARGEST_EXTENDED, bytes(data[:length]), bool(identifier & _EXTENDED), flexible
     )
 
 

@@ -15,6 +15,7 @@ from functools import lru_cache
 from typing import BinaryIO
 
 from drivers.can import CanFrame
+from drivers.can.frame import LARGEST_EXTENDED
 from drivers.logs.canlog import LoggedFrame, Tally, lines
 
 _LINE = re.compile(
@@ -23,7 +24,6 @@ _LINE = re.compile(
     rb"(?:(?P<remote>[Rr][0-9A-Fa-f]?)|(?P<data>(?:[0-9A-Fa-f]{2})*))(?:\s+[RrTt])?\s*"
 )
 _ERROR_FRAME = 0x20000000
-_EXTENDED_MASK = 0x1FFFFFFF
 _STANDARD_DIGITS = 3
 _LARGEST_CLASSIC = 8
 _LARGEST_FLEXIBLE = 64
@@ -50,7 +50,7 @@ def parse(line: bytes) -> LoggedFrame | None:
     flexible = flags is not None
     if len(data) > (_LARGEST_FLEXIBLE if flexible else _LARGEST_CLASSIC):
         raise ValueError("bad_line")
-    frame = CanFrame(identifier & _EXTENDED_MASK, data, len(digits) > _STANDARD_DIGITS, flexible)
+    frame = CanFrame(identifier & LARGEST_EXTENDED, data, len(digits) > _STANDARD_DIGITS, flexible)
     return LoggedFrame(int(seconds + fraction.ljust(9, b"0")), _text(channel), frame)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import BinaryIO, NamedTuple
 
 from drivers.can import CanFrame
+from drivers.can.frame import LARGEST_EXTENDED
 from drivers.logs.canlog import LoggedFrame, Tally, lines
 
 _MILLISECOND = 1_000_000
@@ -21,7 +22,6 @@ _DATA_TYPES = frozenset({b"DT", b"FD", b"FB", b"FE", b"BI"})
 _FLEXIBLE = frozenset({b"FD", b"FB", b"FE", b"BI"})
 _OTHER_TYPES = frozenset({b"RR", b"ST", b"ER", b"EC", b"EV"})
 _LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
-_LARGEST = 0x1FFFFFFF
 _STANDARD_DIGITS = 4
 _NO_FRAME = b"FFFFFFFF"
 _DEFAULT_2 = "N,O,T,B,I,d,R,L,D"
@@ -154,7 +154,7 @@ def frame_of(line: Line) -> CanFrame:
         raise ValueError("bad_line")
     identifier = int(line.identifier, 16)
     data = bytes.fromhex(b" ".join(line.data[: line.length]).decode("latin-1"))
-    if not 0 <= identifier <= _LARGEST or len(data) != line.length:
+    if not 0 <= identifier <= LARGEST_EXTENDED or len(data) != line.length:
         raise ValueError("bad_line")
     return CanFrame(identifier, data, len(line.identifier) > _STANDARD_DIGITS, line.flexible)
 
