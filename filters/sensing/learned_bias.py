@@ -20,6 +20,10 @@ from typing import NamedTuple
 from filters.particle_set import ParticleSet
 from filters.sensing.robust import mixture
 
+NOT_READ = 1
+"""Row that stands for a bias that is not there: none that a kernel reads, for a bias is written to, and a loop that
+reads it by another name cannot run in vector registers."""
+
 _LOG_SQRT_TWO_PI = 0.5 * math.log(2.0 * math.pi)
 
 
@@ -60,7 +64,7 @@ def lesson(particles: ParticleSet, bias: str | None, sigma: float, outliers: flo
     variance = 0.0 if bias is None else particles.variances.get(bias, 0.0)
     total = variance + sigma * sigma
     mixed = mixture(outliers, -0.5 * math.log(total) - _LOG_SQRT_TWO_PI, -math.log(span))
-    row, slope = (0, 0.0) if bias is None else (particles.row(bias), 1.0)
+    row, slope = (NOT_READ, 0.0) if bias is None else (particles.row(bias), 1.0)
     return Lesson(math.sqrt(0.5 / total), *mixed, row, slope, variance / total)
 
 
