@@ -32,8 +32,8 @@ FAR = 16.0
 """Squared distance from the belief, in standard deviations, at which they begin anew as it is."""
 
 MOST, SPAN = 16.0, 10 * SECOND
-"""Of the stated variances so much is believed at most, while a sensor whose errors are independent of each other was
-heard within so many nanoseconds. Otherwise no more than was stated: errors that wander make the vehicle seem to."""
+"""Of the stated variances so much is believed at most, unless a sensor that says where the vehicle is, with errors that
+wander, was heard within so many nanoseconds. Then no more than was stated: by them the vehicle seems to wander."""
 
 INDEPENDENT = 1.0
 """Seconds in which a sensor's readings teach of it as much as one: not all that repeats is known to repeat."""
@@ -56,7 +56,7 @@ class Caution:
         self._shares = NoiseShares(vehicle.motion, vehicle.slow_states)
         self._sensors: dict[str, tuple[SensorShare, int]] = {}
         self._checked = 0
-        self._independent = -(2**62)
+        self._wandering = -(2**62)
 
     def shown(self, name: str) -> float:
         """Return the share of its stated variance that the sensor ``name`` has shown; 1 where nothing was learned."""
@@ -64,12 +64,18 @@ class Caution:
         return 1.0 if known is None else known[0].expected
 
     def sized(self, measured: Measurement) -> Measurement:
-        """Return a measurement with the variance that its sensor has shown."""
+        """Return a measurement with the variance that its sensor has shown.
+
+        Readings that come late by a time that is not known well are all off alike: that part does not show.
+        """
         share = self.shown(measured.name)
         value: object = measured.value
         if share == 1.0:
             return measured
         factor = math.sqrt(share)
+        if isinstance(value, PositionMeasurement) and value.sigma_north and measured.timing > 0.0:
+            late = min(1.0, abs(measured.timing * value.speed) / value.sigma_north)
+            factor = math.sqrt(share + max(0.0, 1.0 - share) * late * late)
         if isinstance(value, RangeMeasurement) and value.sigma is not None:
             return measured._replace(value=value._replace(sigma=factor * value.sigma))
         if isinstance(value, PositionMeasurement) and value.sigma_north is not None:
@@ -93,7 +99,7 @@ class Caution:
         if end - self._checked >= SECOND:
             self._checked = end
             self._check()
-        most = MOST if end - self._independent < SPAN else 1.0
+        most = MOST if end - self._wandering > SPAN else 1.0
         turn, distance = self._shares.reckon()
         motion = self._vehicle.motion
         motion.turn_share, motion.distance_share = min(most, turn), min(most, distance)
@@ -103,8 +109,9 @@ class Caution:
         if type(measured.model) not in BATCHED or not self._shares.live:
             return
         own, weight = None, 0.0
+        if measured.absolute and not measured.independent:
+            self._wandering = time
         if measured.independent:
-            self._independent = time
             own, heard = self._sensors.get(measured.name, (None, time - SECOND))
             own = SensorShare() if own is None else own
             weight = min(1.0, max(0.0, (time - heard) / SECOND / INDEPENDENT))
