@@ -67,8 +67,9 @@ class Blocks:
         Block b lies from ``bounds[b]`` to ``bounds[b + 1]``.
     pairs : list of (int, int)
         The same as plain numbers.
-    pieces : list of list of (int, int)
-        Of the blocks and parts of blocks that each thread moves, all of nearly one size.
+    pieces : list of (n, 2) int64
+        First and last of the blocks and parts of blocks that each thread moves, as many particles as any other; of all
+        blocks where one thread does all.
     """
 
     def __init__(self, largest: int, crew: Crew | None = None) -> None:
@@ -76,7 +77,7 @@ class Blocks:
         self._crew = crew
         self.bounds: NDArray[np.int64] = np.zeros(1, np.int64)
         self.pairs: list[tuple[int, int]] = []
-        self.pieces: list[list[tuple[int, int]]] = []
+        self.pieces: list[NDArray[np.int64]] = []
         self.shared = False
 
     def most(self, capacity: int) -> int:
@@ -91,9 +92,9 @@ class Blocks:
         self.shared = self._crew is not None and count >= max(
             self._crew.fewest, self._crew.threads * ALIGNMENT
         )
-        self.pieces = self._divided(count) if self.shared else []
+        self.pieces = self._divided(count) if self.shared else [np.array(self.pairs)]
 
-    def _divided(self, count: int) -> list[list[tuple[int, int]]]:
+    def _divided(self, count: int) -> list[NDArray[np.int64]]:
         """Divide the blocks among the threads, cutting them at multiples of the alignment from their beginnings."""
         threads = self.threads
         pieces: list[list[tuple[int, int]]] = [[] for _ in range(threads)]
@@ -105,7 +106,7 @@ class Blocks:
             for part, (start, end) in enumerate(pairwise([*cuts, last])):
                 if start < end:
                     pieces[part].append((start, end))
-        return pieces
+        return [np.array(piece, np.int64).reshape(-1, 2) for piece in pieces]
 
     def share_pieces(self, task: Callable[[int], None]) -> None:
         """Call ``task(part)`` for every thread, which works on its :attr:`pieces`."""

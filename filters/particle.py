@@ -13,7 +13,7 @@ import math
 import struct
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,10 +21,10 @@ from numpy.typing import ArrayLike, NDArray
 from filters.belief import Evidence
 from filters.crew import ALIGNMENT, Crew
 from filters.duration import require_duration
-from filters.kernels import evidence, random, weights
+from filters.kernels import evidence, random
 from filters.kernels.compile import Float32Array
 from filters.motion.learned import Learned, SlowState
-from filters.motion.model import Motion, Reopening
+from filters.motion.model import Drawing, Motion, Reopening
 from filters.motion.slow import RandomWalk
 from filters.motion.walks import Walk, Walks
 from filters.particle_belief import EVIDENCE_SAMPLE, TOGETHER
@@ -42,7 +42,7 @@ M = TypeVar("M", bound=tuple[float | None, ...])
 _PACKERS = {number: struct.Struct(f"{8 * number}d") for number in range(2, TOGETHER + 1)}
 """What writes the numbers of several measurements into an array, in half the time that numpy takes for a short list."""
 
-_new: Any = tuple.__new__  # as the constructors make named tuples, without their calls in Python
+_new = cast(Any, tuple.__new__)  # as the constructors make named tuples, without their calls in Python
 
 _REFUSED = Evidence(math.nan, math.nan, accepted=False)
 
@@ -96,6 +96,7 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         pairs = (motion.noises + 1) // 2
         super().__init__(names, capacity, seed, block, crew, 2 * pairs)
         self._motion = motion
+        self._drawing = motion if pairs == 1 and isinstance(motion, Drawing) else None
         self._reopening = motion if isinstance(motion, Reopening) else None
         self._step = 0
         self._no_noise: Float32Array = np.zeros((max(2 * pairs, 2), 1), np.float32)
@@ -153,7 +154,8 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         """
         require_duration("predict", duration)
         move = self._motion.begin(control, duration)
-        self._motion.move(self._centre, 0, 1, self._no_noise, move)
+        if self._drawing is None:
+            self._motion.move(self._centre, 0, 1, self._no_noise, move)
         self._centre_values.clear()
         self._step += 1
         step = self._step & 0xFFFFFFFF
@@ -161,19 +163,21 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         for state in self._learned:
             self._particles.variances[state.name] += state.walk * state.walk * duration
         if self._blocks.shared:
-            pieces = self._blocks.pieces
-            self._blocks.share_pieces(lambda part: self._move(part, pieces[part], step, move, due))
+            self._blocks.share_pieces(lambda part: self._move(part, step, move, due))
         else:
-            self._move(0, self._blocks.pairs, step, move, due)
+            self._move(0, step, move, due)
 
-    def _move(
-        self, part: int, pairs: Sequence[tuple[int, int]], step: int, move: object, due: Sequence[Walk]
-    ) -> None:
-        noise, particles = self._noises[part], self._particles
-        for first, last in pairs:
-            for key, row in self._keys:
-                self._normal_pairs(first, last, step, key, noise, row)
-            self._motion.move(particles, first, last, noise, move)
+    def _move(self, part: int, step: int, move: object, due: Sequence[Walk]) -> None:
+        noise, particles, pieces = self._noises[part], self._particles, self._blocks.pieces[part]
+        if self._drawing is not None:
+            self._drawing.move_all(particles, self._centre, pieces, noise, (step, self._keys[0][0]), move)
+            if not due:
+                return
+        for first, last in pieces.tolist():
+            if self._drawing is None:
+                for key, row in self._keys:
+                    self._normal_pairs(first, last, step, key, noise, row)
+                self._motion.move(particles, first, last, noise, move)
             for walk in due:
                 walk.apply(particles, first, last, noise, step)
 
@@ -240,13 +244,12 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         ]
 
     def _share_weighing_all(self, sensor: Batch[Any], account: Account) -> float:
-        """Weigh with the crew, and return the largest log weight: they look for it while they are there."""
+        """Weigh with the crew, and return the largest log weight."""
         particles = self._particles
         tops = [-inf] * self._blocks.threads
 
         def act(part: int, first: int, last: int) -> None:
-            sensor.weigh_all(particles, first, last, self._numbers, account)
-            tops[part] = weights.peak.direct(particles.log_weights, first, last)
+            tops[part] = sensor.weigh_all(particles, first, last, self._numbers, account)
 
         self._blocks.split(self.count, ALIGNMENT, act)
         return max(tops)

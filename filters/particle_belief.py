@@ -15,6 +15,7 @@ from filters.crew import ALIGNMENT, Blocks, Crew
 from filters.kernels import weights
 from filters.kernels.compile import Float32Array
 from filters.kernels.covariance import covariance
+from filters.kernels.resampling import level
 from filters.particle_checks import check_shape
 from filters.particle_moments import MomentSums
 from filters.particle_set import ParticleSet
@@ -277,10 +278,11 @@ class ParticleBelief:
 
     def _level(self) -> None:
         """Make all weights equal."""
-        count = self.count
-        self._particles.log_weights[:count] = 0.0
-        self._weights[:count] = 1.0
+        self._blocks.split(self.count, ALIGNMENT, self._level_part)
         self._forget_sums()
+
+    def _level_part(self, _part: int, first: int, last: int) -> None:
+        level.direct(self._weights, self._particles.log_weights, first, last)
 
     def _forget_sums(self) -> None:
         """Set the sums of weights that are all one."""

@@ -64,8 +64,8 @@ class RedrawnBelief(ParticleBelief):
             np.zeros((max(noises, 2), min(block + resampling.RUN, capacity)), np.float32)
             for _ in range(self._blocks.threads)
         ]
-        self._redraw = resampling.redraw.direct
-        self._total_of = resampling.total.direct
+        self._masses = np.zeros(self._blocks.most(capacity))
+        self._redraw_all = resampling.redraw.direct
 
     def follow(self, lineage: Int32Array) -> None:
         """Have ``lineage``, (capacity,) int32, laid out with the copies at every resampling, as a column would be."""
@@ -95,26 +95,44 @@ class RedrawnBelief(ParticleBelief):
         if not 1 <= target <= self.capacity:
             raise ValueError(f"resample: count must lie in 1 to {self.capacity} (the capacity), got {target}")
         uniform = random.uniform(self._seed, _RESAMPLING_STREAM, self._draws + 1)
-        sources, ancestors = self.count, self._ancestors[:target]
+        sources, ancestors, source_bounds = self.count, self._ancestors[:target], self._blocks.bounds
         if scheme is not systematic:
             scheme(self._weights[:sources], target, uniform, ancestors)
         self._draws += 1
         self._recount(target)
-        if scheme is systematic and not self._blocks.shared:
-            particles, columns, spare = self._particles, self._particles.columns, self._spare
-            logs, bounds = particles.log_weights, self._blocks.bounds
-            whole = self._total_of(self._weights[:sources])
-            self._redraw(columns, spare, self._weights, logs, sources, whole, ancestors, bounds, uniform)
-            particles.columns, self._spare = spare, columns
-            self._forget_sums()
-            self._lay_out_lineage(sources, ancestors)
-            return
         if scheme is systematic:  # whose checks these weights do not need
-            given = self._weights[:sources]
-            resampling.systematic(given, resampling.total(given), uniform, ancestors)
-        self._lay_out(ancestors)
+            self._redraw(source_bounds, ancestors, uniform)
+        else:
+            self._lay_out(ancestors)
+            self._level()
         self._lay_out_lineage(sources, ancestors)
-        self._level()
+
+    def _redraw(self, source_bounds: NDArray[np.int64], ancestors: Int32Array, uniform: float) -> None:
+        """Draw by Table 4.4 from the blocks that there were, and lay the copies out, all of one weight."""
+        if self._blocks.shared:
+            self._share_drawing(source_bounds, ancestors, uniform)
+            self._lay_out(ancestors)
+            self._level()
+            return
+        columns, spare, logs = self._particles.columns, self._spare, self._particles.log_weights
+        bounds, masses = self._blocks.bounds, self._masses
+        self._redraw_all(
+            columns, spare, self._weights, logs, source_bounds, masses, ancestors, bounds, uniform
+        )
+        self._particles.columns, self._spare = spare, columns
+        self._forget_sums()
+
+    def _share_drawing(self, source_bounds: NDArray[np.int64], ancestors: Int32Array, uniform: float) -> None:
+        given, masses, blocks = self._weights, self._masses, source_bounds.size - 1
+
+        def add(part: int, first: int, last: int) -> None:
+            resampling.totals.direct(given, source_bounds, first, last, masses)
+
+        def draw(part: int, first: int, last: int) -> None:
+            resampling.systematic_blocks.direct(given, source_bounds, first, last, masses, uniform, ancestors)
+
+        self._blocks.split(blocks, 1, add)
+        self._blocks.split(blocks, 1, draw)
 
     def resample_by_label(self, labels: Int32Array, quotas: NDArray[np.int64]) -> None:
         """Draw a given number of particles from those of each label, and lay the labels out with them.
@@ -164,7 +182,7 @@ class RedrawnBelief(ParticleBelief):
         columns, spare, blocks = self._particles.columns, self._spare, self._blocks
 
         def act(part: int, first: int, last: int) -> None:
-            resampling.deal(columns, spare, ancestors, blocks.bounds, first, last)
+            resampling.deal.direct(columns, spare, ancestors, blocks.bounds, first, last)
 
         blocks.split(-(-ancestors.size // resampling.RUN), ALIGNMENT, act)
         self._particles.columns, self._spare = spare, columns

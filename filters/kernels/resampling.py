@@ -24,6 +24,50 @@ def total(weights: Float32Array) -> float:
     return s
 
 
+@kernel("int64(float32[::1], int64, int64, float64, float64, float64, int64, int64, int32[::1])", exact=True)
+def systematic_part(
+    weights: Float32Array,
+    first: int,
+    last: int,
+    before: float,
+    scale: float,
+    uniform: float,
+    start: int,
+    stop: int,
+    ancestors: Int32Array,
+) -> int:
+    """Let the sources ``first`` to ``last`` write themselves to the places ``start`` to ``stop``, and nowhere else.
+
+    ``before`` is the cumulative weight of the sources before them, and ``scale`` the draws per weight.
+    """
+    shift = 1.0 - uniform
+    cumulative = before
+    i = int64(first)
+    while i < last and start <= stop - _AHEAD:
+        cumulative += float64(weights[uint64(i)])
+        end = min(stop, int64(cumulative * scale + shift))
+        for k in range(_AHEAD):
+            ancestors[uint64(start + k)] = i
+        for m in range(start + _AHEAD, end):
+            ancestors[uint64(m)] = i
+        start = end
+        i += 1
+    while i < last and start < stop:
+        cumulative += float64(weights[uint64(i)])
+        end = min(stop, int64(cumulative * scale + shift))
+        for m in range(start, end):
+            ancestors[m] = i
+        start = end
+        i += 1
+    if start < stop:
+        i = last - 1
+        while i > 0 and weights[i] <= 0.0:
+            i -= 1
+        for m in range(start, stop):
+            ancestors[m] = i
+    return stop
+
+
 @kernel("void(float32[::1], float64, float64, int32[::1])", exact=True)
 def systematic(weights: Float32Array, total: float, uniform: float, ancestors: Int32Array) -> None:
     """Table 4.4, with the loops the other way round: each source writes itself where its copies go.
@@ -35,33 +79,50 @@ def systematic(weights: Float32Array, total: float, uniform: float, ancestors: I
     goes to the last source that has weight.
     """
     count = ancestors.size
-    scale = count / total
-    shift = 1.0 - uniform
-    cumulative = 0.0
+    systematic_part(weights, 0, weights.size, 0.0, count / total, uniform, 0, count, ancestors)
+
+
+@kernel("void(float32[::1], int64[::1], int64, int64, float64[::1])")
+def totals(
+    weights: Float32Array,
+    bounds: NDArray[np.int64],
+    first_block: int,
+    last_block: int,
+    out: NDArray[np.float64],
+) -> None:
+    """The :func:`total` of each of some blocks; block b lies from ``bounds[b]`` to ``bounds[b + 1]``."""
+    for block in range(first_block, last_block):
+        out[block] = total(weights[bounds[block] : bounds[block + 1]])
+
+
+@kernel("void(float32[::1], int64[::1], int64, int64, float64[::1], float64, int32[::1])", exact=True)
+def systematic_blocks(
+    weights: Float32Array,
+    bounds: NDArray[np.int64],
+    first_block: int,
+    last_block: int,
+    masses: NDArray[np.float64],
+    uniform: float,
+    ancestors: Int32Array,
+) -> None:
+    """:func:`systematic` by blocks of sources, whose :func:`totals` say which places are theirs: in any order."""
+    count = ancestors.size
+    blocks = bounds.size - 1
+    whole = 0.0
+    for block in range(blocks):
+        whole += masses[block]
+    scale = count / whole
+    before = 0.0
     start = int64(0)
-    i = int64(0)
-    while i < weights.size and start <= count - _AHEAD:
-        cumulative += float64(weights[uint64(i)])
-        end = min(count, int64(cumulative * scale + shift))
-        for k in range(_AHEAD):
-            ancestors[uint64(start + k)] = i
-        for m in range(start + _AHEAD, end):
-            ancestors[uint64(m)] = i
-        start = end
-        i += 1
-    while i < weights.size and start < count:
-        cumulative += float64(weights[uint64(i)])
-        end = min(count, int64(cumulative * scale + shift))
-        for m in range(start, end):
-            ancestors[m] = i
-        start = end
-        i += 1
-    if start < count:
-        i = weights.size - 1
-        while weights[i] <= 0.0:
-            i -= 1
-        for m in range(start, count):
-            ancestors[m] = i
+    for block in range(last_block):
+        after = before + masses[block]
+        stop = count if block == blocks - 1 else min(count, int64(after * scale + (1.0 - uniform)))
+        if block >= first_block:
+            systematic_part(
+                weights, bounds[block], bounds[block + 1], before, scale, uniform, start, stop, ancestors
+            )
+        before = after
+        start = stop
 
 
 @kernel("void(float32[:, ::1], float32[:, ::1], int32[::1], int64[::1], int64, int64)", exact=True)
@@ -99,9 +160,17 @@ def deal(
                 position += RUN
 
 
+@kernel("void(float32[::1], float32[::1], int64, int64)")
+def level(weights: Float32Array, log_weights: Float32Array, first: int, last: int) -> None:
+    """Make some particles weigh the same."""
+    for i in range(first, last):
+        weights[i] = float32(1.0)
+        log_weights[i] = float32(0.0)
+
+
 @kernel(
-    "void(float32[:, ::1], float32[:, ::1], float32[::1], float32[::1], int64, float64, int32[::1], int64[::1],"
-    "float64)",
+    "void(float32[:, ::1], float32[:, ::1], float32[::1], float32[::1], int64[::1], float64[::1], int32[::1],"
+    "int64[::1], float64)",
     exact=True,
 )
 def redraw(
@@ -109,21 +178,21 @@ def redraw(
     target: Float32Array,
     weights: Float32Array,
     log_weights: Float32Array,
-    count: int,
-    whole: float,
+    sources: NDArray[np.int64],
+    masses: NDArray[np.float64],
     ancestors: Int32Array,
     bounds: NDArray[np.int64],
     uniform: float,
 ) -> None:
-    """All of it in one call, for one thread: draw from ``count`` sources, deal the copies, make them weigh the same.
+    """All of it in one call, for one thread: draw from the blocks ``sources``, deal to ``bounds``, level the weights.
 
-    ``whole`` is the sources' :func:`total`, which the compiler might sum in another order in here.
+    ``masses`` has room for the blocks' :func:`totals`.
     """
-    systematic(weights[:count], whole, uniform, ancestors)
+    blocks = sources.size - 1
+    totals(weights, sources, 0, blocks, masses)
+    systematic_blocks(weights, sources, 0, blocks, masses, uniform, ancestors)
     deal(source, target, ancestors, bounds, 0, (ancestors.size + RUN - 1) // RUN)
-    for i in range(ancestors.size):
-        weights[i] = float32(1.0)
-        log_weights[i] = float32(0.0)
+    level(weights, log_weights, 0, ancestors.size)
 
 
 def block_sizes(count: int, largest: int) -> list[int]:

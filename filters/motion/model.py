@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
 
 from filters.kernels.compile import Float32Array
 from filters.motion.slow import RandomWalk
@@ -75,6 +78,43 @@ class Motion(Protocol[Control, Step]):
             Standard normals; column 0 belongs to particle ``first``.
         step : Step
             Of :meth:`begin`.
+        """
+        ...
+
+
+@runtime_checkable
+class Drawing(Protocol):
+    """What a motion model of one or two noises offers beside that if one compiled call can draw them and move by them.
+
+    It spares a small set the calls from Python, and threads their waiting for each other between two of them. A model
+    that does not offer it is handed its normals block by block, with the same result.
+    """
+
+    def move_all(
+        self,
+        particles: ParticleSet,
+        centre: ParticleSet,
+        pieces: NDArray[np.int64],
+        noise: Float32Array,
+        draw: tuple[int, int],
+        step: Any,
+    ) -> None:
+        """Draw for some blocks, and do to them what :meth:`Motion.move` does.
+
+        Parameters
+        ----------
+        particles : ParticleSet
+            The set; only its columns are written.
+        centre : ParticleSet
+            One particle, moved without noise by whoever moves particle 0.
+        pieces : (n, 2) int64
+            First and last of each block, or of a part of it.
+        noise : (2, >= largest piece) float32
+            Room for the normals.
+        draw : (int, int)
+            Number and key of the draw (:func:`filters.kernels.random.normal_pairs`).
+        step : Step
+            Of :meth:`Motion.begin`.
         """
         ...
 

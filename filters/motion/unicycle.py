@@ -13,12 +13,18 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+import numpy as np
 from numpy import float32
+from numpy.typing import NDArray
 
 from filters.kernels.compile import Float32Array, kernel
 from filters.kernels.elementary import sincos, wrapped
+from filters.kernels.random import normal_pairs
 from filters.motion.slow import RandomWalk
 from filters.particle_set import ParticleSet
+
+_STILL: Float32Array = np.zeros((2, 1), np.float32)
+"""The noise that the centre is moved with."""
 
 GYRO_BIAS = "gyro_bias"
 ODOMETRY_SCALE = "odometry_scale"
@@ -189,6 +195,18 @@ class Unicycle:
         """Move a block of particles in place; see :class:`filters.motion.Motion`."""
         roll.direct(particles.columns, noise, first, last, *step)
 
+    def move_all(
+        self,
+        particles: ParticleSet,
+        centre: ParticleSet,
+        pieces: NDArray[np.int64],
+        noise: Float32Array,
+        draw: tuple[int, int],
+        step: UnicycleStep,
+    ) -> None:
+        """Draw for some blocks and move them; see :class:`filters.motion.model.Drawing`."""
+        roll_all.direct(particles.columns, centre.columns, _STILL, pieces, noise, *draw, *step)
+
 
 @kernel(
     "void(float32[:, ::1], float32[:, ::1], int64, int64, float32, float32, float32, float32, float32, float32,"
@@ -225,3 +243,56 @@ def roll(
         heading[i] = wrapped(float32(h + t))
         bias[i] += bias_gain * turn_noise[i]
         scale[i] += scale_gain * distance_noise[i]
+
+
+@kernel(
+    "void(float32[:, ::1], float32[:, ::1], float32[:, ::1], int64[:, ::1], float32[:, ::1], uint32, uint32, float32,"
+    "float32, float32, float32, float32, float32, float32)"
+)
+def roll_all(
+    columns: Float32Array,
+    centre: Float32Array,
+    still: Float32Array,
+    pieces: NDArray[np.int64],
+    noise: Float32Array,
+    number: int,
+    stream_key: int,
+    distance: float,
+    turn: float,
+    duration: float,
+    distance_sigma: float,
+    turn_sigma: float,
+    bias_gain: float,
+    scale_gain: float,
+) -> None:
+    """Draw for one piece after the other and :func:`roll` it; the centre goes with particle 0, without noise."""
+    for k in range(pieces.shape[0]):
+        first, last = pieces[k, 0], pieces[k, 1]
+        normal_pairs(first, last, number, stream_key, noise, 0)
+        roll(
+            columns,
+            noise,
+            first,
+            last,
+            distance,
+            turn,
+            duration,
+            distance_sigma,
+            turn_sigma,
+            bias_gain,
+            scale_gain,
+        )
+        if first == 0:
+            roll(
+                centre,
+                still,
+                0,
+                1,
+                distance,
+                turn,
+                duration,
+                distance_sigma,
+                turn_sigma,
+                bias_gain,
+                scale_gain,
+            )

@@ -98,7 +98,7 @@ class Batch(Protocol[Measurement]):
 
     def weigh_all(
         self, particles: ParticleSet, first: int, last: int, numbers: Float64Array, account: Account
-    ) -> None:
+    ) -> float:
         """Do what :meth:`Sensor.weigh` does, for one measurement after the other.
 
         Parameters
@@ -111,5 +111,10 @@ class Batch(Protocol[Measurement]):
             Of :meth:`tabulate`.
         account : Account
             Where the rest is written; ``said`` by every caller, with the same numbers.
+
+        Returns
+        -------
+        float
+            The largest log weight among these particles, as it is then.
         """
         ...

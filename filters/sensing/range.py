@@ -17,6 +17,7 @@ from numpy import float32
 from filters.kernels.compile import Float32Array, function, kernel
 from filters.kernels.elementary import Real, log_mixture
 from filters.kernels.evidence import CHUNK, thin
+from filters.kernels.weights import peak
 from filters.particle_set import ParticleSet
 from filters.sensing.model import Account, Float64Array
 from filters.sensing.robust import check, mixture, sigma_refusal
@@ -143,16 +144,15 @@ class Range:
 
     def weigh_all(
         self, particles: ParticleSet, first: int, last: int, numbers: Float64Array, account: Account
-    ) -> None:
+    ) -> float:
         """Add the log likelihoods of several ranges in turn; see :class:`filters.sensing.model.Batch`."""
         columns, log_weights = particles.columns, particles.log_weights
         if self._plain:
-            gaussian_all.direct(columns, log_weights, first, last, numbers, *account)
-            return
+            return gaussian_all.direct(columns, log_weights, first, last, numbers, *account)
         scale_row, scale_slope = (0, 0.0) if self.scale is None else (particles.row(self.scale), 1.0)
         bias_row, bias_slope = (0, 0.0) if self.bias is None else (particles.row(self.bias), 1.0)
         slow = (scale_row, scale_slope, bias_row, bias_slope)
-        robust_all.direct(columns, log_weights, first, last, numbers, *account, *slow)
+        return robust_all.direct(columns, log_weights, first, last, numbers, *account, *slow)
 
     def _constants(self, sigma: float) -> tuple[float, float, float, float]:
         """Return what the kernels want to know of a standard deviation: the gain, and the three of the mixture."""
@@ -241,7 +241,7 @@ def away(centre: Float32Array, numbers: Float64Array) -> float:
 
 
 @kernel(
-    "void(float32[:, ::1], float32[::1], int64, int64, float64[:, ::1], int64, float32[:, ::1], int64,"
+    "float64(float32[:, ::1], float32[::1], int64, int64, float64[:, ::1], int64, float32[:, ::1], int64,"
     "float32[:, ::1], float64[:, ::1])"
 )
 def gaussian_all(
@@ -255,7 +255,7 @@ def gaussian_all(
     stride: int,
     samples: Float32Array,
     said: Float64Array,
-) -> None:
+) -> float:
     """Do what :func:`gaussian` does for several ranges, a row of numbers each, and keep a sample after every one."""
     for start in range(first, last, CHUNK):
         end = min(start + CHUNK, last)
@@ -276,10 +276,11 @@ def gaussian_all(
     for k in range(rows):
         said[k, 0] = numbers[k, 7]
         said[k, 1] = numbers[k, 0] - away(centre, numbers[k])
+    return peak(log_weights, first, last)
 
 
 @kernel(
-    "void(float32[:, ::1], float32[::1], int64, int64, float64[:, ::1], int64, float32[:, ::1], int64,"
+    "float64(float32[:, ::1], float32[::1], int64, int64, float64[:, ::1], int64, float32[:, ::1], int64,"
     "float32[:, ::1], float64[:, ::1], int64, float32, int64, float32)"
 )
 def robust_all(
@@ -297,7 +298,7 @@ def robust_all(
     scale_slope: float,
     bias_row: int,
     bias_slope: float,
-) -> None:
+) -> float:
     """Do what :func:`robust` does for several ranges, a row of numbers each, and keep a sample after every one."""
     for start in range(first, last, CHUNK):
         end = min(start + CHUNK, last)
@@ -325,3 +326,4 @@ def robust_all(
     for k in range(rows):
         said[k, 0] = numbers[k, 7]
         said[k, 1] = numbers[k, 0] - factor * away(centre, numbers[k]) - bias_slope * centre[bias_row, 0]
+    return peak(log_weights, first, last)

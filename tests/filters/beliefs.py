@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,7 +34,7 @@ def started(
     capacity: int = 0,
     block: int = 32768,
     seed: int = 3,
-    **spread: float,
+    **spread: Any,
 ) -> Filter:
     belief = ParticleFilter(motion, capacity=max(capacity, count), seed=seed, block=block)
     belief.initialize(columns(count, **spread))

@@ -164,7 +164,7 @@ def test_all_at_once_is_one_after_the_other(sensor: Range, count: int) -> None:
         together = beliefs[0].weigh_all(sensor, measured)
         apart = [beliefs[1].weigh(sensor, measurement) for measurement in measured]
         assert beliefs[0].weights.tobytes() == beliefs[1].weights.tobytes()
-        np.testing.assert_allclose(together, apart, rtol=1e-6, atol=1e-12)
+        np.testing.assert_allclose(np.array(together), np.array(apart), rtol=1e-6, atol=1e-12)
         assert beliefs[0].moments().mean.tobytes() == beliefs[1].moments().mean.tobytes()
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
 
 from filters.kernels import resampling as kernels
 from filters.resampling import systematic
@@ -167,3 +170,36 @@ def test_copies_are_dealt_to_the_blocks(count: int, largest: int, seed: int) -> 
     for run in range(runs):
         hands[run % len(sizes)] += ancestors[run * kernels.RUN : (run + 1) * kernels.RUN].tolist()
     assert np.array_equal(target, source[:, [i for hand in hands for i in hand]])
+
+
+@pytest.mark.interpreted
+@given(
+    hnp.arrays(np.float32, st.integers(1, 300), elements=st.sampled_from([0.0, 1e-6, 0.3, 1.0])),
+    st.integers(1, 400),
+    st.floats(1e-9, 1.0),
+    st.lists(st.integers(0, 300), max_size=4),
+    st.randoms(use_true_random=False),
+)
+@settings(deadline=None)
+def test_blocks_may_draw_in_any_order(
+    weights: NDArray[np.float32], count: int, uniform: float, cuts: list[int], random: Random
+) -> None:
+    """Every place is filled, ancestors ascend with floor or ceiling of their share, as the whole would draw them."""
+    assume(weights.sum() > 0.0)
+    bounds = np.array(sorted([0, weights.size, *(min(cut, weights.size) for cut in cuts)]))
+    blocks = list(range(bounds.size - 1))
+    masses = np.zeros(len(blocks))
+    random.shuffle(blocks)
+    for block in blocks:
+        kernels.totals(weights, bounds, block, block + 1, masses)
+    ancestors = np.full(count + 8, -7, np.int32)
+    for block in blocks:
+        kernels.systematic_blocks(weights, bounds, block, block + 1, masses, uniform, ancestors[:count])
+    assert np.all(ancestors[count:] == -7)
+    drawn = ancestors[:count]
+    assert np.all(np.diff(drawn) >= 0)
+    assert np.all(weights[drawn] > 0.0)
+    share = weights.astype(np.float64) * count / weights.sum(dtype=np.float64)
+    copies = np.bincount(drawn, minlength=weights.size)
+    assert np.all(np.abs(copies - share) < 1.0 + 1e-6)
+    assert np.count_nonzero(drawn != systematic(weights, count, uniform)) <= len(blocks)

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy import special
 
 from filters.kernels.evidence import account_for, thin
 
@@ -28,7 +27,7 @@ def test_evidence_is_a_chain_of_ratios() -> None:
     samples = np.random.default_rng(2).normal(-3.0, 2.0, (4, 60)).astype(np.float32)
     said = np.array([[0.5, 7.0], [-1.0, 8.0], [2.0, 9.0], [0.0, 0.0]])
     after = account_for(samples, 3, 50, 1.25, said)
-    sums = [1.25, *special.logsumexp(samples[:3, :50].astype(np.float64), axis=1)]
+    sums = np.array([1.25, *np.log(np.exp(samples[:3, :50].astype(np.float64)).sum(axis=1))])
     np.testing.assert_allclose(said[:3, 0], np.array([0.5, -1.0, 2.0]) + np.diff(sums), atol=2e-5)
     assert after == pytest.approx(sums[-1], abs=2e-5)
     assert said[:, 1].tolist() == [7.0, 8.0, 9.0, 0.0]
