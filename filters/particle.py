@@ -235,8 +235,7 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         if self._blocks.shared:
             self._top = self._share_weighing_all(batch, account)
         else:
-            self._top = None
-            batch.weigh_all(particles, 0, particles.count, self._numbers, account)
+            self._top = batch.weigh_all(particles, 0, particles.count, self._numbers, account)
         self._log_sum = self._account_for(samples, number, self._sampled, self._log_sum, said)
         self._weighed = True
         return [

@@ -72,7 +72,7 @@ class ParticleBelief:
         self._normalize = weights.normalize.direct
         self._log_sum = 0.0
         self._total = self._squares = 0.0
-        self._top: float | None = None
+        self._top: float | None = None  # the largest log weight, where somebody has just seen it
         self._weighed = False
 
     @property
@@ -125,12 +125,13 @@ class ParticleBelief:
         weights and ``collapses`` counts it; the evidence of the measurement that did it is minus infinity or
         close to it.
         """
-        if self._blocks.shared:
-            top, total, squares = self._share_normalizing()
+        if self._blocks.shared or (self._top is not None and self._blocks.number > 1):
+            top, total, squares = self._normalize_by_parts()
         else:
             top, total, squares = self._normalize(
                 self._particles.log_weights, self._weights, self._blocks.bounds, self._sums
             )
+        self._top = None
         if not total > 0.0:
             self.collapses += 1
             self._level()
@@ -139,7 +140,7 @@ class ParticleBelief:
         self._log_sum -= top
         self._weighed = False
 
-    def _share_normalizing(self) -> tuple[float, float, float]:
+    def _normalize_by_parts(self) -> tuple[float, float, float]:
         log_weights, bounds, sums = self._particles.log_weights, self._blocks.bounds, self._sums
 
         def exponentiate(part: int, first: int, last: int) -> None:
@@ -288,6 +289,7 @@ class ParticleBelief:
         """Set the sums of weights that are all one."""
         self._total = self._squares = float(self.count)
         self._log_sum = math.log(self._sampled)
+        self._top = None
         self._weighed = False
 
     def _recount(self, count: int) -> None:

@@ -92,6 +92,24 @@ def test_a_collapse_is_the_same() -> None:
     assert belief.effective_sample_size == pytest.approx(5000.0)
 
 
+@pytest.mark.parametrize("crew", [None, Backwards(2)], ids=["alone", "two"])
+def test_the_largest_weight_is_not_taken_twice(crew: Backwards | None) -> None:
+    """Normalising once more changes nothing, and nor does it after a resampling that nothing was weighed since."""
+    belief = ParticleFilter(Unicycle(0.1, 0.1, 0.0, 0.0), capacity=5000, seed=1, crew=crew, block=1000)
+    belief.initialize({name: np.linspace(-1.0, 1.0, 5000) for name in belief.names})
+    belief.weigh_all(Range(0.05, outliers=0.0), TWO_RANGES)
+    belief.normalize()
+    weights, size = belief.weights.copy(), belief.effective_sample_size
+    assert weights.max() == pytest.approx(1.0)
+    belief.normalize()
+    assert np.array_equal(belief.weights, weights)
+    assert belief.effective_sample_size == size
+    belief.weigh_all(Range(0.05, outliers=0.0), TWO_RANGES)
+    belief.resample()
+    belief.normalize()
+    assert np.all(belief.weights == 1.0)
+
+
 def test_a_crew_is_left_alone_when_it_would_not_help() -> None:
     crew = Backwards(2)
     crew.fewest = 1001
