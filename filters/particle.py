@@ -25,7 +25,7 @@ from filters.kernels import evidence, random
 from filters.kernels.compile import Float32Array
 from filters.motion.learned import Learned, SlowState
 from filters.motion.model import Drawing, Motion, Reopening
-from filters.motion.slow import RandomWalk
+from filters.motion.slow import RandomWalk, diffuse
 from filters.motion.walks import Walk, Walks
 from filters.particle_belief import EVIDENCE_SAMPLE, TOGETHER
 from filters.particle_checks import check_start
@@ -43,6 +43,8 @@ _PACKERS = {number: struct.Struct(f"{8 * number}d") for number in range(2, TOGET
 """What writes the numbers of several measurements into an array, in half the time that numpy takes for a short list."""
 
 _new = cast(Any, tuple.__new__)  # as the constructors make named tuples, without their calls in Python
+
+_REOPENING_STREAM = 5 << 32
 
 _REFUSED = Evidence(math.nan, math.nan, accepted=False)
 
@@ -102,6 +104,7 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         self._no_noise: Float32Array = np.zeros((max(2 * pairs, 2), 1), np.float32)
         self._learned = [state for state in slow if isinstance(state, Learned)]
         sampled = [state for state in slow if isinstance(state, RandomWalk)]
+        self._sampled_states = [state.name for state in sampled]
         self._walks = Walks((*motion.walks, *sampled), self._particles, seed, pairs)
         self._keys = [(random.key(seed, stream), 2 * stream) for stream in range(pairs)]
         self._normal_pairs = random.normal_pairs.direct
@@ -299,9 +302,10 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         return constants[0]
 
     def reopen(self, effective_sample_size: float) -> None:
-        """Open the motion's slow states again after a resampling, so that few ancestors' means do not freeze them.
+        """Open slow states again after a resampling, so that they do not freeze at few ancestors' values.
 
-        Mean, covariance with the pose and variance of each stay what they were; see :mod:`filters.reopening`.
+        Those that the motion marginalises get a wider variance, those that are sampled are drawn apart; those that a
+        sensor learns stay. Mean, covariance with the pose and variance of each stay what they were; see :mod:`filters.reopening`.
 
         Parameters
         ----------
@@ -312,13 +316,20 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         if motion is None:
             return
         names = list(motion.conditional_variances)
-        rows = [self._particles.row(name) for name in names]
+        rows = [self._particles.row(name) for name in (*names, *self._sampled_states)]
         columns, count = self._particles.columns, self.count
         opened = reopen(columns[:3, :count], columns[rows, :count], effective_sample_size)
-        if opened is not None:
-            taken, variances = opened
-            columns[rows, :count] -= taken
-            motion.reopen(dict(zip(names, variances.tolist(), strict=True)))
+        if opened is None:
+            return
+        taken, variances = opened
+        columns[rows, :count] -= taken
+        motion.reopen(dict(zip(names, variances[: len(names)].tolist(), strict=True)))
+        step = self._draws & 0xFFFFFFFF
+        for axis, (row, variance) in enumerate(zip(rows[len(names) :], variances[len(names) :], strict=True)):
+            key = random.key(self._seed, _REOPENING_STREAM + axis)
+            for first, last in self._blocks.pairs:
+                self._normal_pairs(first, last, step, key, self._noises[0], 0)
+                diffuse(columns, row, first, last, self._noises[0], 0, math.sqrt(variance))
 
     def _given_path(self) -> Mapping[str, float]:
         variances = self._motion.conditional_variances

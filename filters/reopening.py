@@ -13,6 +13,9 @@ parameter and state estimation in simulation-based filtering", 2001), but nothin
 goes where a Kalman filter keeps it, and the motion's own draws tell the particles apart again. With h = 1 and a
 Gaussian belief that is exact. A belief need not be Gaussian, so h is Silverman's bandwidth for a kernel over pose and
 states (:mod:`filters.regularization`).
+
+A state that is sampled (a receiver's delay) has no P: its h² Var(r) is drawn as noise, as Liu and West do, of each by
+itself.
 """
 
 from __future__ import annotations

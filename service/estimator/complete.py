@@ -2,7 +2,8 @@
 
 A horizon waits for the slowest of a link's measurements, each time. Where controls bridge the way from the horizon to
 now that costs little; where there are none it is way that nobody knows. But there is nothing to wait for before the
-newest reading of the sender who is behind: with one sender, a reading is as good as it gets when it arrives.
+newest reading of the sender who is behind: with one sender, a reading is as good as it gets when it arrives. A wait
+of a moment stays as it is: the ranges of one round are better weighed together.
 """
 
 from __future__ import annotations
@@ -11,6 +12,9 @@ from service.estimator.track import SECOND
 
 PATIENCE = 2 * SECOND
 """Beyond the horizon's own wait: who has said nothing for so long is not waited for."""
+
+MOMENT = SECOND // 10
+"""A wait no longer than this is kept."""
 
 
 class Complete:
@@ -23,7 +27,9 @@ class Complete:
         """Note a reading of ``time``, nanoseconds."""
         self._newest[sender] = max(time, self._newest.get(sender, time))
 
-    def until(self, horizon: int) -> int:
-        """Return up to when all has come, at least ``horizon`` (nanoseconds), which waits for no one any longer."""
+    def until(self, now: int, horizon: int) -> int:
+        """Return up to when all has come by ``now``; at least ``horizon``, for what is older is not waited for."""
+        if now - horizon <= MOMENT:
+            return horizon
         awaited = [time for time in self._newest.values() if time >= horizon - PATIENCE]
         return max(horizon, min(awaited, default=horizon))

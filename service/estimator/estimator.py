@@ -201,7 +201,7 @@ class Estimator:
             course.set(Level.FULL, Cause.NONE, CROWD)
         horizon = now - round(self.configuration.loop.horizon_ms * 1e6)
         if not self._vehicle.guided:
-            horizon = self._intake.complete.until(horizon)
+            horizon = self._intake.complete.until(now, horizon)
         passed = self._intake.release(horizon)
         self._stopwatch.lap("ingest")
         afforded = min(afforded, self._filter.capacity)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from filters.motion.slow import RandomWalk
 from filters.motion.unicycle import GYRO_BIAS, ODOMETRY_SCALE, Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
 from filters.regularization import silverman
@@ -91,3 +92,28 @@ def test_a_filter_s_slow_states_keep_their_variance() -> None:
     assert np.allclose(after.variance, before.variance, rtol=1e-3)
     assert motion.conditional_variances[GYRO_BIAS] > 1.05 * left_open[GYRO_BIAS]
     assert motion.conditional_variances[ODOMETRY_SCALE] > 1.05 * left_open[ODOMETRY_SCALE]
+
+
+def test_copies_of_a_sampled_state_come_apart() -> None:
+    """Of twenty values among 4,000 copies: mean and variance stay, to four sigmas of the draws; no two are alike."""
+    motion = Unicycle(0.1, 0.02, 1e-4, 1e-4)
+    belief = ParticleFilter(motion, capacity=COUNT, seed=6, slow=[RandomWalk("delay", 0.0)])
+    random = np.random.default_rng(8)
+    start = {name: random.standard_normal(COUNT) for name in ("north", "east")}
+    few = np.repeat(random.standard_normal(20), COUNT // 20)
+    belief.initialize(
+        start
+        | {
+            "heading": np.zeros(COUNT),
+            GYRO_BIAS: np.zeros(COUNT),
+            ODOMETRY_SCALE: np.ones(COUNT),
+            "delay": few,
+        }
+    )
+    before = belief.column("delay").copy()
+    belief.reopen(100.0)
+    after = belief.column("delay")
+    four_sigmas = 4.0 * float(few.std()) / COUNT**0.5
+    assert abs(float(after.mean() - before.mean())) < four_sigmas
+    assert abs(float(after.std() - before.std())) < four_sigmas
+    assert np.unique(after).size > 0.99 * COUNT

@@ -5,31 +5,33 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.estimator.complete import PATIENCE, Complete
+from service.estimator.complete import MOMENT, PATIENCE, Complete
 from service.estimator.track import SECOND
+
+LONG = 100 * SECOND
 
 
 def test_one_sender_is_waited_for_no_longer_than_his_newest_reading() -> None:
     complete = Complete()
-    assert complete.until(10 * SECOND) == 10 * SECOND
+    assert complete.until(LONG, 10 * SECOND) == 10 * SECOND
     complete.heard("fixes", 12 * SECOND)
-    assert complete.until(10 * SECOND) == 12 * SECOND
-    assert complete.until(13 * SECOND) == 13 * SECOND
+    assert complete.until(LONG, 10 * SECOND) == 12 * SECOND
+    assert complete.until(LONG, 13 * SECOND) == 13 * SECOND
 
 
 def test_of_two_the_one_behind_decides() -> None:
     complete = Complete()
     complete.heard("fixes", 12 * SECOND)
     complete.heard("ranges", 11 * SECOND)
-    assert complete.until(10 * SECOND) == 11 * SECOND
+    assert complete.until(LONG, 10 * SECOND) == 11 * SECOND
 
 
 def test_who_has_fallen_silent_is_not_waited_for() -> None:
     complete = Complete()
     complete.heard("ranges", 1 * SECOND)
     complete.heard("fixes", 12 * SECOND)
-    assert complete.until(1 * SECOND + PATIENCE) == 1 * SECOND + PATIENCE
-    assert complete.until(1 * SECOND + PATIENCE + 1) == 12 * SECOND
+    assert complete.until(LONG, 1 * SECOND + PATIENCE) == 1 * SECOND + PATIENCE
+    assert complete.until(LONG, 1 * SECOND + PATIENCE + 1) == 12 * SECOND
 
 
 @given(st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 100))))
@@ -39,6 +41,13 @@ def test_nothing_comes_late_that_is_sent_in_order_within_the_wait(told: list[tup
     for sender in sent:
         complete.heard(sender, 0)
     for sender, step in told:
-        assert complete.until(0) <= sent[sender]
+        assert complete.until(LONG, 0) <= sent[sender]
         sent[sender] += step
         complete.heard(sender, sent[sender])
+
+
+def test_a_moment_s_wait_is_kept() -> None:
+    complete = Complete()
+    complete.heard("ranges", 12 * SECOND)
+    assert complete.until(11 * SECOND + MOMENT, 11 * SECOND) == 11 * SECOND
+    assert complete.until(11 * SECOND + MOMENT + 1, 11 * SECOND) == 12 * SECOND
