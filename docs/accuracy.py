@@ -28,6 +28,7 @@ HEAD = (
     "NEES",
     "EKF: RMSE, m",
     "EKF: inside 95 %",
+    "end of the blanking",
     "tracking",
     "speed",
     "command",
@@ -54,26 +55,64 @@ class Row:
     prepare: Callable[[], None] = lambda: None
 
 
-def prepare_car() -> None:
-    """Write the car's receiver, blanked from 20 to 50 s, its truth and its configuration."""
-    spec = spec_from_file_location("car", ROOT / "tests" / "sitl" / "car.py")
+def loaded(name: str) -> Any:
+    """Return a module of ``tests/sitl``: what makes files of recordings lies there."""
+    spec = spec_from_file_location(name, ROOT / "tests" / "sitl" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
-    car = module_from_spec(spec)
-    spec.loader.exec_module(car)
-    recording = (ROOT / DATA / "comma2k19_seg40.candump.gz").resolve()
-    folder = ROOT / OUT
-    folder.mkdir(parents=True, exist_ok=True)
-    car.configuration(folder, recording)
-    car.truth(folder, recording)
-    car.gnss(folder, recording, (20.0, 50.0))
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def folder() -> Path:
+    """Return the folder for what the rows' commands read."""
+    path = ROOT / OUT
+    path.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+def recorded(name: str) -> Path:
+    """Return the path of a recording."""
+    return (ROOT / DATA / name).resolve()
+
+
+def prepare_car() -> None:
+    """Write the car's receiver, its truth and its configuration."""
+    car, recording = loaded("car"), recorded("comma2k19_seg40.candump.gz")
+    car.configuration(folder(), recording)
+    car.truth(folder(), recording)
+    car.gnss(folder(), recording)
+
+
+def prepare_field() -> None:
+    """Write the mower's field without its start, and the second half of its truth."""
+    references = loaded("references")
+    references.without_start(folder(), recorded("plaza2.toml"))
+    references.half(folder(), recorded("plaza2_truth.csv"))
+
+
+def prepare_copter() -> None:
+    """Write what EKF3 made of the copter among beacons, settled."""
+    loaded("references").ekf3(folder(), recorded("bcn_katwijk1.bin"), SETTLED)
+
+
+def prepare_telemetry() -> None:
+    """Write the copter's fixes as a truth."""
+    loaded("references").fixes(folder(), recorded("ubc_mission1.tlog"))
+
+
+def prepare_delay() -> None:
+    """Write the rover's facts with sensors that do not know the receiver's delay."""
+    facts = recorded("sitl_rover.toml").read_text(encoding="utf-8")
+    (folder() / "rover_delay.toml").write_text(facts + UNKNOWN_DELAY, encoding="utf-8")
 
 
 def prepare_robot() -> None:
     """Make recordings of the robot among landmarks, with its bar codes' names and without."""
     script = ROOT / "examples" / "mrclam.py"
     run = ROOT / DATA / "mrclam_D7_R1.npz"
-    subprocess.run([sys.executable, str(script), str(run), str(ROOT / OUT)], check=True, capture_output=True)
+    subprocess.run([sys.executable, str(script), str(run), str(folder())], check=True, capture_output=True)
 
 
 def replayed(stem: str, ending: str = ".tlog") -> Row:
@@ -84,18 +123,71 @@ def replayed(stem: str, ending: str = ".tlog") -> Row:
 
 CAR = DATA / "comma2k19_seg40.candump.gz"
 CAR_FILES = (str(CAR), f"{OUT}/gnss.tlog", "--config", f"{OUT}/car.toml", "--truth", f"{OUT}/truth.csv")
+COPTER = DATA / "bcn_katwijk1.bin"
+SETTLED = 30.0
+"""Seconds after EKF3's first word from which the copter is compared with it."""
+
+TELEMETRY = DATA / "ubc_mission1.tlog"
+TELEMETRY_FILES = (
+    *(str(TELEMETRY), "--config", f"{OUT}/ubc_mission1.toml"),
+    *("--truth", f"{OUT}/ubc_mission1_gnss.csv"),
+)
+UNKNOWN_DELAY = """
+[motion]
+yaw_rate_delay_ms = 56.0          # what a rover's 4 Hz filter of the gyro takes
+[[sensor]]
+kind = "position"
+estimate = ["delay"]
+[[sensor]]
+kind = "velocity"
+estimate = ["delay"]
+"""
 ROBOT = DATA / "mrclam_D7_R1.npz"
 SITL = Path("tests/sitl/data")
 ROWS = (
     Row("scenario `beacons`", (), ("scenario", "beacons")),
     replayed("plaza2"),
     *(replayed(f"uwb_{way}") for way in ("los_a1", "los_b3", "nlos_a1", "nlos_b3")),
-    Row("`comma2k19_seg40`, GNSS blanked from 20 to 50 s", (CAR,), ("replay", *CAR_FILES), prepare_car),
+    Row(
+        "plaza2, from anywhere, second half",
+        (DATA / "plaza2.tlog",),
+        (
+            *("replay", str(DATA / "plaza2.tlog"), "--config", f"{OUT}/plaza2_field.toml"),
+            *("--truth", f"{OUT}/plaza2_truth_second_half.csv"),
+        ),
+        prepare_field,
+    ),
+    Row(
+        "`comma2k19_seg40`, GNSS blanked from 20 to 50 s",
+        (CAR,),
+        ("replay", *CAR_FILES, "--blank", "position:20-50"),
+        prepare_car,
+    ),
     Row("mrclam_D7_R1, landmarks known", (ROBOT,), ("replay", f"{OUT}/mrclam_D7_R1.mcap"), prepare_robot),
     Row("mrclam_D7_R1, unknown", (ROBOT,), ("replay", f"{OUT}/mrclam_D7_R1_unknown.mcap"), prepare_robot),
-    replayed("bcn_katwijk1", ".bin"),
-    replayed("ubc_mission1"),
+    Row(
+        "bcn_katwijk1, against EKF3",
+        (COPTER, COPTER.with_suffix(".npz")),
+        ("replay", str(COPTER), "--truth", f"{OUT}/ekf3.csv"),
+        prepare_copter,
+    ),
+    Row("ubc_mission1, against its fixes", (TELEMETRY,), ("replay", *TELEMETRY_FILES), prepare_telemetry),
+    Row(
+        "ubc_mission1, GNSS blanked from 400 to 460 s",
+        (TELEMETRY,),
+        ("replay", *TELEMETRY_FILES, "--blank", "GPS_RAW_INT:400-460"),
+        prepare_telemetry,
+    ),
     replayed("sitl_rover"),
+    Row(
+        "sitl_rover, delay unknown",
+        (DATA / "sitl_rover.tlog",),
+        (
+            *("replay", str(DATA / "sitl_rover.tlog"), "--config", f"{OUT}/rover_delay.toml"),
+            *("--truth", str(DATA / "sitl_rover_truth.csv")),
+        ),
+        prepare_delay,
+    ),
     replayed("sitl_jam"),
     *(
         Row(f"{stem}, trimmed", (SITL / f"{stem}.tlog",), ("replay", str(SITL / f"{stem}.tlog")))
@@ -115,6 +207,20 @@ def spread(summary: dict[str, Any], name: str, form: str, statistic: str | None 
     return mean if summary.get("seeds") == 1 else f"{mean} ± {form.format(values['sd'])}"
 
 
+def ended(summary: dict[str, Any]) -> str:
+    """Return how far off the end of the first blanking was, of how long a way, and the Kalman filter's there."""
+    if not summary["outages"]:
+        return "–"
+    outage = summary["outages"][0] | {"seeds": summary["seeds"]}
+    said = f"{spread(outage, 'error_m', '{:.1f}')} m"
+    if "share" in outage:
+        said += f", {spread(outage, 'share', '{:.2%}')} of {outage['distance_m']['mean']:.0f} m"
+    said += f"; 95 % within {spread(outage, 'radius_m', '{:.0f}', 'mean')} m"
+    if summary["shadow_outages"]:
+        said += f"; EKF {summary['shadow_outages'][0]['error_m']['mean']:.1f} m"
+    return said
+
+
 def measured(row: Row, seeds: int) -> str:
     """Run a row's command and return its line."""
     row.prepare()
@@ -123,7 +229,7 @@ def measured(row: Row, seeds: int) -> str:
     shown = f"`beliefd {' '.join(row.command)} --seeds {seeds}`"
     if done.returncode != 0:
         said = " ".join(done.stderr.split()) or f"exit {done.returncode}"
-        return f"| {row.name} | {' | '.join('–' * 8)} | {shown}: {said[-120:]} |"
+        return f"| {row.name} | {' | '.join('–' * (len(HEAD) - 2))} | {shown}: {said[-120:]} |"
     summary = json.loads(done.stdout)["summary"]
     shadow = summary["shadow"] | {"seeds": seeds}
     cells = (
@@ -134,7 +240,8 @@ def measured(row: Row, seeds: int) -> str:
         spread(summary, "nees_mean", "{:.2f}"),
         spread(shadow, "rmse_m", "{:.3f}", "mean"),
         spread(shadow, "coverage_95", "{:.1%}", "mean"),
-        f"{summary['health'].get('tracking', 0.0):.1%}",
+        ended(summary),
+        f"{summary['health'].get('tracking', 0.0):.1%}, after {spread(summary, 'tracked_after_s', '{:.0f}', 'mean')} s",
         "x" + spread(summary, "real_time_factor", "{:.0f}", "min"),
         shown,
     )
