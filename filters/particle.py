@@ -305,7 +305,8 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         """Open slow states again after a resampling, so that they do not freeze at few ancestors' values.
 
         Those that the motion marginalises get a wider variance, those that are sampled are drawn apart; those that a
-        sensor learns stay. Mean, covariance with the pose and variance of each stay what they were; see :mod:`filters.reopening`.
+        sensor learns stay. Mean, covariance with the pose and variance of each stay what they were
+        (:mod:`filters.reopening`).
 
         Parameters
         ----------

@@ -66,8 +66,10 @@ def reopen(
     apart: Columns = means - means.mean(axis=1, keepdims=True)
     alike = np.einsum("ik,jk->ij", around, around) / pose.shape[1]
     shared = np.einsum("ik,jk->ij", apart, around) / pose.shape[1]
-    inverse: NDArray[np.float64] = np.linalg.pinv(alike, rcond=_TELLS, hermitian=True)
-    apart -= (shared @ inverse).astype(np.float32) @ around
+    values, vectors = np.linalg.eigh(alike)
+    told = values > _TELLS * values[-1]
+    slopes = shared @ vectors[:, told] / values[told] @ vectors[:, told].T
+    apart -= np.asarray(slopes, np.float32) @ around
     bandwidth = min(1.0, silverman(max(1.0, effective_sample_size), len(pose) + len(means)))
     variances = np.einsum("ij,ij->i", apart, apart, dtype=np.float64) / pose.shape[1]
     apart *= np.float32(1.0 - math.sqrt(1.0 - bandwidth * bandwidth))
