@@ -15,7 +15,7 @@ from typing import Any
 from drivers.sample import Inertial, Sample
 from filters.sensing import PositionMeasurement
 from service.config import Sensor
-from service.estimator.controls import Choice, Source
+from service.estimator.controls import Choice, Controls, Source
 from service.estimator.measuring import (
     KINDS,
     Measurement,
@@ -114,6 +114,10 @@ class BoundSensor:
         self._last_magnetic = time
         return True
 
+    def is_control(self, sample: Sample, controls: Controls) -> bool:
+        """Say whether a speed is in the control by now: compared with that, it would vouch for itself."""
+        return self._beside and controls.holds(sample)
+
     def name(self, sample: Sample) -> str:
         """Return the name under which a sample's fate is recorded: kind, link, and the beacon where there is one."""
         return f"{self.settings.kind}/{sample.link}{self._label}{self._kind.suffix(sample.reading)}"
@@ -121,7 +125,7 @@ class BoundSensor:
     def measure(self, sample: Sample, place: Place) -> Measurement | Refusal:
         """Return ``sample`` as a measurement, or why it cannot be one."""
         name = self.name(sample)
-        if self._beside and place.controls.holds(sample):
+        if self.is_control(sample, place.controls):
             return Refusal(name, CONTROL)
         if self._kind.memory is not None:
             self.memory = self._memory_of(sample, self._kind.memory)

@@ -170,6 +170,10 @@ class Intake:
             record.refused["implausible"] += 1
             return
         self._heard.add(sensor.title)
+        if sensor.is_control(sample, self._controls):
+            record.accepted += 1
+            record.last = sample.time
+            return
         self.complete.heard(sensor.name(sample), sample.time - sensor.delay)
         reason = self._timeline.insert(Waiting(sensor, sample), sample.time - sensor.delay, sample.received)
         if reason == "late" and self.latecomers is not None:
