@@ -35,6 +35,10 @@ MOST, SPAN = 16.0, 10 * SECOND
 """Of the stated variances so much is believed at most, unless a sensor that says where the vehicle is, with errors that
 wander, was heard within so many nanoseconds. Then no more than was stated: by them the vehicle seems to wander."""
 
+PRUDENCE = 0.5
+"""What a measurement teaches of the noise, as a share of what it would if the models were right (Grünwald, "The safe
+Bayesian", 2012): real ranges and real wheels are not as Gaussian as they are taken to be."""
+
 INDEPENDENT = 1.0
 """Seconds in which a sensor's readings teach of it as much as one: not all that repeats is known to repeat."""
 
@@ -118,9 +122,8 @@ class Caution:
             self._sensors[measured.name] = (own, time)
             if self._vehicle.stands:
                 weight = 0.0
-        self._shares.hear(
-            measured.model, measured.value, measured.log_outlier, 1.0 / measured.repeats, own, weight
-        )
+        worth = PRUDENCE / measured.repeats
+        self._shares.hear(measured.model, measured.value, measured.log_outlier, worth, own, weight)
 
     def _check(self) -> None:
         moments = self._belief.moments()
