@@ -15,7 +15,7 @@ from typing import Any
 from drivers.sample import Inertial, Sample
 from filters.sensing import PositionMeasurement
 from service.config import Sensor
-from service.estimator.controls import Choice, Controls, Source
+from service.estimator.controls import Controls
 from service.estimator.measuring import (
     KINDS,
     Measurement,
@@ -35,6 +35,9 @@ SHORTEST_INTERVAL = 1e-3
 
 TIMING = 0.02
 """Seconds by which a stamp may be off after its clock was mapped: at speed v, v times this many metres."""
+
+LONG_SILENCE = 30 * SECOND
+"""Of a sensor that hears one speaker at a time: each has errors of its own that last, so a change costs accuracy."""
 
 MOST_SPEAKERS = 64
 """Sources are named from outside: of more than so many that one sensor hears all are forgotten."""
@@ -77,7 +80,8 @@ class BoundSensor:
         self._kind = KINDS[settings.kind]
         self.memory: Any = None
         self._memories: dict[tuple[str, str], Any] = {}
-        self._speaker = Choice() if self._kind.alone else None
+        self._speaker: tuple[str, str] | None = None
+        self._spoke = -(2**62)
         self.part = self._kind.part(settings)
         self._label = self._kind.label(settings)
         self._beside = settings.kind == "speed" and surroundings.rolls
@@ -104,9 +108,17 @@ class BoundSensor:
             return False
         if not isinstance(sample.reading, kind.readings) or not kind.wants(settings, sample.reading):
             return False
-        if self._speaker is not None:
-            return self._speaker.accepts(Source(0, sample.link, sample.source), sample.time)
+        if self._kind.alone and not self._speaks(sample):
+            return False
         return not isinstance(sample.reading, Inertial) or self._in_turn(sample.time)
+
+    def _speaks(self, sample: Sample) -> bool:
+        """Say whether the sample is of the one speaker; another takes over when that has been silent for long."""
+        speaker = (sample.link, sample.source)
+        if speaker != self._speaker and sample.time - self._spoke < LONG_SILENCE:
+            return False
+        self._speaker, self._spoke = speaker, sample.time
+        return True
 
     def _in_turn(self, time: int) -> bool:
         if time - self._last_magnetic < MAGNETIC_INTERVAL:

@@ -91,15 +91,15 @@ def test_a_barometer_keeps_the_height_when_the_fixes_end(dimensions: int) -> Non
 
 
 def test_a_rover_climbs_a_hill_by_its_barometer() -> None:
-    """No fix at all: up 10 m in 40 s from a given height, by pressure alone; the second barometer, 3 m off, is not
-    heard beside the first."""
+    """No fix at all: up 10 m in 40 s from a given height, by pressure alone; the other barometer, 3 m off, is not heard
+    beside the one that spoke first, whatever their names."""
 
     def said(t: float) -> Iterable[tuple[str, AnyReading]]:
         up = 0.25 * t
         yield "GYRO", Rotation(0.0)
         yield "WHEEL_DISTANCE", Odometer((2.0 * t,))
-        yield "SCALED_PRESSURE", Pressure(pascal(500.0 + up + WEATHER))
-        yield "SCALED_PRESSURE2", Pressure(pascal(500.0 + up + WEATHER + 3.0))
+        yield "SCALED_PRESSURE2", Pressure(pascal(500.0 + up + WEATHER))
+        yield "SCALED_PRESSURE", Pressure(pascal(500.0 + up + WEATHER + 3.0))
 
     sensors = [{"kind": "altitude", "sigma": 0.2, "estimate": ["bias"]}]
     estimator = Estimator(configuration("unicycle", sensors), seed=1)
