@@ -29,7 +29,7 @@ def probability_within(radius: ArrayLike, major: ArrayLike, minor: ArrayLike) ->
 
 
 @lru_cache(maxsize=16)
-def _table(probability: float) -> NDArray[np.float64]:
+def _table(probability: float) -> list[float]:
     """Radius over the larger standard deviation, by the ratio of the smaller to the larger, 0 to 1."""
     ratios = np.linspace(0.0, 1.0, _RATIOS)
     low = np.zeros(_RATIOS)
@@ -39,7 +39,7 @@ def _table(probability: float) -> NDArray[np.float64]:
         below = probability_within(middle, np.ones(_RATIOS), ratios) < probability
         low = np.where(below, middle, low)
         high = np.where(below, high, middle)
-    return 0.5 * (low + high)
+    return (0.5 * (low + high)).tolist()
 
 
 def radius(covariance: ArrayLike, probability: float) -> float:
@@ -63,7 +63,7 @@ def radius(covariance: ArrayLike, probability: float) -> float:
     if not 0.0 < probability < 1.0:
         raise ValueError(f"radius: probability must lie in (0, 1), got {probability}")
     matrix = np.asarray(covariance, np.float64)
-    nn, ne, ee = float(matrix[0, 0]), float(matrix[0, 1]), float(matrix[1, 1])
+    nn, ne, ee = matrix.item(0, 0), matrix.item(0, 1), matrix.item(1, 1)
     middle = 0.5 * (nn + ee)
     half = math.hypot(0.5 * (nn - ee), ne)
     if not math.isfinite(middle + half):
@@ -74,8 +74,8 @@ def radius(covariance: ArrayLike, probability: float) -> float:
     place = math.sqrt(max(middle - half, 0.0)) / major * (_RATIOS - 1)
     index = min(int(place), _RATIOS - 2)
     table = _table(probability)
-    lower = float(table[index])
-    return major * (lower + (place - index) * (float(table[index + 1]) - lower))
+    lower = table[index]
+    return major * (lower + (place - index) * (table[index + 1] - lower))
 
 
 def mahalanobis_square(difference: ArrayLike, covariance: ArrayLike) -> float:

@@ -85,6 +85,8 @@ class Seeing:
         """Whether a sample is seen; the first one asked about is the beginning."""
         if self._begin is None:
             self._begin = sample.received
+        if not self._blanks:
+            return True
         seconds = (sample.received - self._begin) / SECOND
         hides = any(blank.hides(sample, seconds) for blank in self._blanks)
         self.hidden += hides

@@ -73,6 +73,7 @@ class Tally:
     first: Estimate | None = None
     last: Estimate | None = None
     tracked: float | None = None
+    ticks: int = 0
 
     def add(self, estimate: Estimate, places: Hypotheses | None = None) -> None:
         """Count one tick, with the places that were published beside it where there are several."""
@@ -80,6 +81,7 @@ class Tally:
         self.first = self.first or estimate
         if self.tracked is None and estimate.health is HealthState.TRACKING:
             self.tracked = estimate.time
+        self.ticks += 1
         self.health[estimate.health] += 1
         self.particles += estimate.particles
         north, east, _ = estimate.position
@@ -87,11 +89,6 @@ class Tally:
         if north is not None and east is not None and None not in (nn, ne, ee):
             mixture = None if places is None else mixture_of(places)
             self.path.add(estimate.time, north, east, (nn or 0.0, ne or 0.0, ee or 0.0), mixture)
-
-    @property
-    def ticks(self) -> int:
-        """How many there were."""
-        return sum(self.health.values())
 
     @property
     def tracked_after(self) -> float | None:
