@@ -71,6 +71,13 @@ class BoundSensor:
         Kind, link, sigma, outliers, slow states.
     surroundings : Surroundings
         The beacons and landmarks of the configuration, by id.
+
+    Attributes
+    ----------
+    title : str
+        Kind and link, as the configuration names them.
+    readings : tuple[type, ...]
+        What it may want.
     """
 
     def __init__(self, settings: Sensor, surroundings: Surroundings) -> None:
@@ -84,6 +91,8 @@ class BoundSensor:
         self._spoke = -(2**62)
         self.part = self._kind.part(settings)
         self._label = self._kind.label(settings)
+        self.title = f"{settings.kind}/{settings.link or '*'}{self._label}"
+        self.readings = self._kind.readings
         self._beside = settings.kind == "speed" and surroundings.rolls
         self._last_magnetic = -(2**62)
         self._last_time = -(2**62)
@@ -93,11 +102,6 @@ class BoundSensor:
         given = settings.correlation_s
         self._correlation = self._kind.correlation if given is None else given
         self._lasts = settings.kind == "position" and self._correlation > 0.0
-
-    @property
-    def title(self) -> str:
-        """Kind and link, as the configuration names them."""
-        return f"{self.settings.kind}/{self.settings.link or '*'}{self._label}"
 
     def wants(self, sample: Sample) -> bool:
         """Say whether ``sample`` is this sensor's."""

@@ -73,6 +73,7 @@ class Intake:
         self._sensors = [BoundSensor(sensor, surroundings) for sensor in configuration.sensor]
         self._timeline: Timeline[Waiting] = Timeline()
         self._heard: set[str] = set()
+        self._listeners: dict[type, tuple[BoundSensor, ...]] = {}
 
     def take(self, samples: Iterable[Sample]) -> None:
         """Take samples as they arrive.
@@ -145,9 +146,18 @@ class Intake:
         else:
             self.dropped["implausible"] += 1
 
+    def _listeners_to(self, reading: type) -> tuple[BoundSensor, ...]:
+        """Note which sensors may want readings of a type: of most there is none."""
+        found = tuple(sensor for sensor in self._sensors if issubclass(reading, sensor.readings))
+        self._listeners[reading] = found
+        return found
+
     def _queue(self, sample: Sample) -> None:
         """Have ``sample`` wait for the horizon; it is the first sensor's that wants it: twice it would count double."""
-        sensor = next((sensor for sensor in self._sensors if sensor.wants(sample)), None)
+        listeners = self._listeners.get(type(sample.reading))
+        if listeners is None:
+            listeners = self._listeners_to(type(sample.reading))
+        sensor = next((sensor for sensor in listeners if sensor.wants(sample)), None) if listeners else None
         if sensor is None:
             return
         self._wait(sensor, sample)
