@@ -10,11 +10,9 @@ from rich.table import Table
 
 from service.config import CanLink, Configuration, Link, MavlinkLink
 from service.config.signals import notes_on_signals
+from service.publish.topics import LIVE, QUERIES, REQUESTS, TOPICS
 
-KEYS = (
-    "estimate", "estimate/slow", "particles", "budget", "sensors", "health",
-    "@rpc/latest", "@rpc/status", "@rpc/config", "@rpc/schema", "@live",
-)  # fmt: skip
+KEYS = (*(topic.key for topic in TOPICS), *QUERIES, *REQUESTS, LIVE)
 
 
 def _table(title: str, *columns: str) -> Table:

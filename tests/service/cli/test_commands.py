@@ -50,6 +50,12 @@ def test_what_stands_in_brackets_is_text_and_no_markup(command: str, words: str)
     assert words in beliefd(command, "--help").stdout
 
 
+def test_a_check_names_every_key_that_is_published(configuration: Path) -> None:
+    said = "".join(beliefd("check", configuration).stdout.replace("│", " ").split())
+    for key in ("estimate/slow", "hypotheses", "health", "@rpc/reinitialize", "@rpc/density", "@live"):
+        assert key in said
+
+
 COMMANDS = ["demo", "run", "check", "sim", "listen", "send", "replay", "scenario", "textbook", "service"]
 
 
