@@ -132,6 +132,8 @@ class Drift:
     def __init__(self, rates: Matrix, duration: float) -> None:
         if rates.ndim != 2 or rates.shape[0] != rates.shape[1] or rates.size == 0:
             raise ValueError(f"drift: a square matrix is needed, got shape {rates.shape}")
+        if not np.abs(rates.sum(axis=1)).max() <= ROW_TOLERANCE:
+            raise ValueError(f"drift: each row must sum to zero, got {rates.tolist()}")
         leaving = [-rates.item(state, state) for state in range(len(rates))]
         if not (duration >= 0.0 and max(leaving) * duration <= 1.0):
             raise ValueError(f"drift: no state may be left more than once, got {duration} s")

@@ -10,7 +10,14 @@ import pytest
 import scipy.linalg
 import scipy.sparse
 
-from filters.transition import DenseTransition, SparseTransition, transition, transition_over
+from filters.transition import (
+    DenseTransition,
+    Drift,
+    Forgetting,
+    SparseTransition,
+    transition,
+    transition_over,
+)
 
 
 @pytest.mark.parametrize("duration", [0.0, 1e-6, 0.3, 1.0, 40.0, 1e5])
@@ -50,3 +57,32 @@ def test_triplets_that_occur_twice_add_up() -> None:
 def test_what_makes_no_sense_is_refused(make: Callable[[], object], what: str) -> None:
     with pytest.raises(ValueError, match=what):
         make()
+
+
+def test_a_drift_is_the_matrix_exponential_to_first_order() -> None:
+    rates = np.array([[-0.2, 0.2, 0.0], [0.05, -0.06, 0.01], [0.05, 0.2, -0.25]])
+    belief = np.array([0.2, 0.7, 0.1])
+    for duration in (0.0, 0.02, 0.2):
+        moved = Drift(rates, duration).predict(belief)
+        assert moved.sum() == pytest.approx(1.0, abs=1e-15)
+        exact = belief @ scipy.linalg.expm(rates * duration)
+        np.testing.assert_allclose(moved, exact, atol=0.5 * (0.5 * duration) ** 2)
+
+
+def test_forgetting_goes_back_to_an_even_belief_by_its_share() -> None:
+    belief = np.array([0.2, 0.7, 0.1])
+    dense = DenseTransition(0.7 * np.eye(3) + 0.1)
+    np.testing.assert_allclose(Forgetting(3, 0.3).predict(belief), dense.predict(belief), rtol=1e-14)
+    assert Forgetting(3, 0.0).size == 3
+
+
+def test_refuses_a_drift_that_is_no_chain_and_a_share_that_is_none() -> None:
+    rates = np.array([[-2.0, 2.0], [1.0, -1.0]])
+    with pytest.raises(ValueError, match="more than once"):
+        Drift(rates, 0.6)
+    with pytest.raises(ValueError, match="sum to zero"):
+        Drift(np.eye(2), 0.1)
+    with pytest.raises(ValueError, match="square"):
+        Drift(np.zeros((2, 3)), 0.1)
+    with pytest.raises(ValueError, match="share"):
+        Forgetting(3, 1.5)

@@ -138,6 +138,21 @@ def test_more_noise_for_one_member_widens_that_one_alone() -> None:
     _agree(bank, singles)
 
 
+def test_the_spread_of_what_is_expected_is_that_of_the_covariance_and_all_can_be_set_alike() -> None:
+    bank, _ = _pair(3, 8)
+    said = bank.expect(Position(1.0, lever=(0.4, -0.2)), PositionMeasurement(1.0, 2.0))
+    for member in range(3):
+        jacobian = said.jacobian[member]
+        expected = jacobian @ bank.covariance[member] @ jacobian.T
+        np.testing.assert_allclose(bank.spread(said, member), expected, rtol=1e-12)
+    mean, covariance = _gaussian(np.random.default_rng(9))
+    bank.live[1] = False
+    bank.set_all(mean, covariance)
+    assert bank.live.all()
+    np.testing.assert_array_equal(bank.mean[0], bank.mean[2])
+    np.testing.assert_allclose(bank.covariance[1], covariance, rtol=1e-12)
+
+
 def test_refuses_what_is_no_gaussian_no_control_and_no_sensor() -> None:
     bank, _ = _pair(1, 7)
     with pytest.raises(ValueError, match="at least one member"):
