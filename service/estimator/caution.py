@@ -31,9 +31,9 @@ NARROW, NARROW_HEADING = 3.0, 0.35
 FAR = 16.0
 """Squared distance from the belief, in standard deviations, at which they begin anew as it is."""
 
-MOST, SPAN = 16.0, 10 * SECOND
-"""Of the stated variances so much is believed at most, unless a sensor that says where the vehicle is, with errors that
-wander, was heard within so many nanoseconds. Then no more than was stated: by them the vehicle seems to wander."""
+SPAN = 10 * SECOND
+"""What was stated holds until so many nanoseconds after a sensor was heard that says where the vehicle is, with errors
+that wander: they pass for the vehicle's own."""
 
 PRUDENCE = 0.5
 """What a measurement teaches of the noise, as a share of what it would if the models were right (Grünwald, "The safe
@@ -103,10 +103,10 @@ class Caution:
         if end - self._checked >= SECOND:
             self._checked = end
             self._check()
-        most = MOST if end - self._wandering > SPAN else 1.0
-        turn, distance = self._shares.reckon()
         motion = self._vehicle.motion
-        motion.turn_share, motion.distance_share = min(most, turn), min(most, distance)
+        motion.turn_share = motion.distance_share = 1.0
+        if end - self._wandering > SPAN:
+            motion.turn_share, motion.distance_share = self._shares.reckon()
 
     def weighed(self, time: int, measured: Measurement, evidence: Evidence, outlier: bool) -> None:
         """Learn from a measurement, which is handed over as it was stated."""
