@@ -45,7 +45,7 @@ def systematic_part(
     i = int64(first)
     while i < last and start <= stop - _AHEAD:
         cumulative += float64(weights[uint64(i)])
-        end = min(stop, int64(cumulative * scale + shift))
+        end = min(stop, int(cumulative * scale + shift))
         for k in range(_AHEAD):
             ancestors[uint64(start + k)] = i
         for m in range(start + _AHEAD, end):
@@ -54,7 +54,7 @@ def systematic_part(
         i += 1
     while i < last and start < stop:
         cumulative += float64(weights[uint64(i)])
-        end = min(stop, int64(cumulative * scale + shift))
+        end = min(stop, int(cumulative * scale + shift))
         for m in range(start, end):
             ancestors[m] = i
         start = end
@@ -113,10 +113,10 @@ def systematic_blocks(
         whole += masses[block]
     scale = count / whole
     before = 0.0
-    start = int64(0)
+    start = 0
     for block in range(last_block):
         after = before + masses[block]
-        stop = count if block == blocks - 1 else min(count, int64(after * scale + (1.0 - uniform)))
+        stop = count if block == blocks - 1 else min(count, int(after * scale + (1.0 - uniform)))
         if block >= first_block:
             systematic_part(
                 weights, bounds[block], bounds[block + 1], before, scale, uniform, start, stop, ancestors

@@ -51,7 +51,9 @@ def command(
     out: Annotated[Path | None, typer.Option(help="Folder for estimates_seedN.csv.", file_okay=False)] = None,
     report: Annotated[
         Path | None,
-        typer.Option(help="Write one self-contained page, of seed 0 (needs beliefd\\[view]).", dir_okay=False),
+        typer.Option(
+            help="Write one self-contained page, of seed 0 (needs beliefd\\[view]).", dir_okay=False
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as one JSON object.")] = False,
     particles: Annotated[
