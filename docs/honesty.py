@@ -30,7 +30,7 @@ PICTURE = FOLDER / "honesty-calibration.svg"
 CALIBRATION = ("<!-- calibration: begin -->", "<!-- calibration: end -->")
 ABLATION = ("<!-- ablation: begin -->", "<!-- ablation: end -->")
 SCENARIOS = ("beacons", "mirror", "kidnap", "late_fix", "spoof", "multipath", "slip", "jam", "outage")
-SWITCHES = ("hypotheses", "recovery", "trust", "motion_mode")
+SWITCHES = ("hypotheses", "recovery", "trust", "motion_mode", "noise_learning")
 LIED_TO = ("kidnap",)
 """Scenarios whose start is a lie told with certainty: no belief can be right until the evidence comes."""
 

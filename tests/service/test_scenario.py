@@ -61,4 +61,4 @@ def test_a_switch_is_turned_off_and_the_others_stay() -> None:
 def test_a_switch_that_there_is_not_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert command("beacons", 1, as_json=False, play=Play(without=("luck",))) == 2
     said = " ".join(capsys.readouterr().out.split())
-    assert "--without luck: [honesty] has hypotheses, recovery, trust, motion_mode" in said
+    assert "--without luck: [honesty] has hypotheses, recovery, trust, noise_learning, motion_mode" in said
