@@ -115,7 +115,7 @@ def numpy_float64(count: int) -> Step:
 
 
 def beliefd(count: int) -> Step:
-    """Through the public face of the filter, as the daemon calls it."""
+    """Through the public face of the filter; the ranges are Gaussian, as the others have them."""
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from service import kernels
 
@@ -130,13 +130,13 @@ def beliefd(count: int) -> Step:
     start = START[:, None] + SPREAD[:, None] * np.random.default_rng(1).standard_normal((3, count))
     names = ("north", "east", "heading", "gyro_bias", "odometry_scale")
     belief.initialize(dict(zip(names, (*start, np.zeros(count), np.ones(count)), strict=True)))
-    sensor = Range(RANGE_SIGMA)
+    sensor = Range(RANGE_SIGMA, outliers=0.0)
     beacons = [(float(n), float(e)) for n, e in BEACONS]
 
     def step(control: np.ndarray, ranges: np.ndarray) -> tuple[float, float]:
         belief.predict(UnicycleControl(float(control[0]) * DT, float(control[1]) * DT), DT)
-        for distance, (n, e) in zip(ranges.tolist(), beacons, strict=True):
-            belief.weigh(sensor, RangeMeasurement(distance, n, e))
+        told = zip(ranges.tolist(), beacons, strict=True)
+        belief.weigh_all(sensor, [RangeMeasurement(distance, n, e) for distance, (n, e) in told])
         belief.normalize()
         found = belief.moments()
         if belief.effective_sample_size < count / 2:

@@ -247,8 +247,9 @@ def measure(kind: str, count: int, seconds: float, priority: int) -> dict[str, A
 class Insatiable(Estimator):
     """Demands the count asked for, whatever the spread of its belief."""
 
-    def _reckon_demand(self, now: int) -> None:
-        self._demand = self.configuration.budget.particles_max
+    def __init__(self, configuration: Configuration, stopwatch: Meters) -> None:
+        super().__init__(configuration, stopwatch)
+        self._population.demand_of = lambda belief: configuration.budget.particles_max
 
 
 def table(rows: list[dict[str, str]]) -> str:

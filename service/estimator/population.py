@@ -50,6 +50,8 @@ class Population:
 
     Attributes
     ----------
+    demand_of : Callable[[ParticleFilter], int]
+        How many particles a belief needs, by the KLD bound.
     demand : int
         How many the belief needs (KLD bound, and enough for each hypothesis), as reckoned last.
     tracker : Tracker or None
@@ -62,13 +64,13 @@ class Population:
         self._budget = configuration.budget
         self._belief = belief
         self._stopwatch = stopwatch
-        self._demand_of = Demand(
+        self.demand_of: Callable[[ParticleFilter[Any]], int] = Demand(
             POSITION_BIN,
             HEADING_BIN,
             error=KLD_ERROR,
             minimum=self._budget.particles_min,
             maximum=self._budget.particles_max,
-        )
+        ).particles
         self.demand = self._budget.particles_min
         self.tracker: Tracker | None = None
         self.still: Callable[[], float] = lambda: 0.0
@@ -125,7 +127,7 @@ class Population:
     def reckon(self, now: int) -> None:
         """Reckon the demand, if the last time is long enough ago."""
         if now - self._reckoned >= DEMAND_INTERVAL:
-            demand = self._demand_of.particles(self._belief)
+            demand = self.demand_of(self._belief)
             if self.tracker is not None:
                 demand = min(max(demand, self.tracker.demand), self._budget.particles_max)
             self.demand = demand
