@@ -8,9 +8,10 @@ makes dearer (ingest, witnesses, publishing), a tick is a line over the count, a
 keeps those of the last ticks: what nearly every one of them could have had is the supply.
 
 Kept are ticks that weighed something: motion, sensing, resampling *and* extraction are paid from the budget as if
-each tick were one of these, for the tick that is must fit, too. A tick without measurements, or one that had to leave
-some out, is kept where even that cost more than there is room for. What the others would have cost nobody knows (the
-first measurement carries what all share), so the remembered costs fade until a whole tick is tried again.
+each tick were one of these, for the tick that is must fit, too. A tick without measurements is kept where even that
+cost more than there is room for. One that was cut had too many particles: it is kept as if each measurement left out
+had cost as much as those that were not. With the fewest particles that would be wrong for ever (the first measurement
+carries what all share), so of a tick that left some out there the remembered costs fade, until a whole one is tried.
 
 The count does not hunt: it shrinks at once when the supply falls below it, and grows by at most a tenth per
 tick, only while the supply is clearly above it, and never quite up to it.
@@ -237,6 +238,8 @@ class Governor:
             self._thinned.add(rest, each, weighed)
             if weighed == offered or too_dear:
                 self._whole.add(rest, each, weighed)
+            elif self._rung is WHOLE and count > self._smallest:
+                self._whole.add(rest, each, offered)
             else:
                 self._whole.fade(FADING)
         elif too_dear and not offered:
@@ -244,8 +247,6 @@ class Governor:
             self._thinned.add(all_of_it, FREE, 0)
 
     def _split(self, stage: str, seconds: float, count: int) -> Line:
-        if stage == WITNESSES:
-            return Line(seconds, 0.0)
         shape = self._shapes.get(stage, PROPORTIONAL)
         if stage in self._after:
             self._after[stage].add(seconds / shape.at(count))

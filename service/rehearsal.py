@@ -64,7 +64,8 @@ def rehearse(configuration: Configuration) -> dict[str, Shape]:
     """Run a second of ticks with few and with many particles, and with none; return the shapes of the stages.
 
     Each tick has a reading of every sensor. What grows with their number is divided by it: the shapes are those of a
-    tick with one measurement.
+    tick with one measurement. The witnesses hardly notice the count, but now and then one of them begins anew as the
+    belief is, which takes its moments.
     """
     few = configuration.budget.particles_min
     many = min(configuration.budget.particles_max, max(MANY, 2 * few))
@@ -74,8 +75,8 @@ def rehearse(configuration: Configuration) -> dict[str, Shape]:
         for stage in PARTICLE_STAGES
         if cheap[stage] > 0.0 and dear[stage] > 0.0
     }
-    if cheap[WITNESSES] > 0.0:
-        shapes[WITNESSES] = Shape(cheap[WITNESSES], 0.0)
+    if cheap[WITNESSES] > 0.0 and "extraction" in shapes:
+        shapes[WITNESSES] = Shape(cheap[WITNESSES], shapes["extraction"].per_particle)
     measurements = max(1, _measurements(configuration))
     for stage in PER_MEASUREMENT:
         if stage in shapes:

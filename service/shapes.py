@@ -19,7 +19,7 @@ from service.config import Configuration
 from service.governor import Shape
 from service.rehearsal import rehearse, touch
 
-_PREFIX = "costs"
+_PREFIX = "cost"
 """Changes when the shapes' meaning does: what an older version has kept is not taken for this one's."""
 
 _KEPT = 16

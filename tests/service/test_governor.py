@@ -131,7 +131,8 @@ def test_stages_that_peak_apart_are_not_paid_for_together() -> None:
 
     The sum of the stages' own high quantiles would be 6 ms, and starve it. Closed form.
     """
-    governor = fresh()
+    shapes = SHAPES | {"witnesses": Shape(2e-4, 2e-9)}
+    governor = Governor(BUDGET, SMALLEST, LARGEST, shapes)
     for tick in range(2 * WINDOW):
         dear = ("ingest", "witnesses", "publishing")[tick % 3]
         observe(
@@ -151,6 +152,20 @@ def test_the_first_measurement_is_not_the_price_of_each() -> None:
         weighed = min(governor.decide(SMALLEST).most, 4)
         governor.observe({"sensing": 2e-3 + weighed * 1e-4} if weighed else {}, SMALLEST, 4, weighed)
     assert governor.decide(SMALLEST).level is Level.FULL
+
+
+def test_a_tick_that_was_cut_had_too_many_particles() -> None:
+    """Every second tick is cut after 2 of 4 measurements: the count falls to what all four of them leave room for."""
+    governor = Governor(BUDGET, SMALLEST, LARGEST, {"sensing": Shape(1e-5, 5e-9)})
+    counts: list[int] = []
+    for _ in range(4 * WINDOW):
+        count = governor.decide(LARGEST).count
+        weighed = max(1, min(4, int((BUDGET - 1e-3) / (1e-5 + 5e-9 * count))))
+        governor.observe({"ingest": 1e-3, "sensing": weighed * (1e-5 + 5e-9 * count)}, count, 4, weighed)
+        counts.append(count)
+    affordable = (BUDGET - 1e-3 - 4e-5) / (4 * 5e-9)
+    assert 0.85 * affordable <= counts[-1] <= affordable
+    assert max(counts[WINDOW:]) <= affordable
 
 
 def test_demand_within_the_supply_is_met_in_full() -> None:
