@@ -8,7 +8,13 @@ from typing import Any
 
 from service.bench.measure import Point
 
-COLOURS = {"motion": "#0072b2", "sensing": "#e69f00", "resampling": "#009e73", "extraction": "#cc79a7"}
+COLOURS = {
+    "motion": "#0072b2",
+    "sensing": "#e69f00",
+    "witnesses": "#882255",
+    "resampling": "#009e73",
+    "extraction": "#cc79a7",
+}
 
 
 def draw(points: Sequence[Point], limits: Sequence[tuple[float, float]], path: Path) -> None:
@@ -42,7 +48,7 @@ def draw(points: Sequence[Point], limits: Sequence[tuple[float, float]], path: P
         capsize=3,
         label="tick",
     )
-    for stage in points[0].stages:
+    for stage in (name for name, cost in points[0].stages.items() if cost > 0.0):
         axes.plot(
             counts,
             [1e3 * p.stages[stage] for p in points],
@@ -62,5 +68,5 @@ def draw(points: Sequence[Point], limits: Sequence[tuple[float, float]], path: P
     axes.set_ylabel("processor time per tick, ms")
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(visible=True, which="major", color="#dddddd", linewidth=0.7)
-    axes.legend(frameon=False, loc="lower right")
+    figure.legend(frameon=False, loc="outside right center")
     figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
