@@ -3,7 +3,8 @@
     python benchmarks/memory.py [--ticks 20000] [--particles 3000]
 
 The loop and the estimator of the daemon in one process, memory set up as in the daemon, on the samples of
-benchmarks/saturation.py. Prints what every tenth of the run added; after the first all should be zero.
+benchmarks/saturation.py. Prints what every tenth of the run added; after the first all should be zero. Writes
+docs/performance.md.
 """
 
 from __future__ import annotations
@@ -11,11 +12,10 @@ from __future__ import annotations
 import argparse
 import contextlib
 import resource
-import time
 from pathlib import Path
 
 import saturation as rover
-from report import machine
+from report import machine, write
 
 from service.budget import Meters
 from service.channels import Heart, Outlet, pair
@@ -44,6 +44,7 @@ def main() -> None:
     room = bytearray(1 << 18)
     tenth = max(1, arguments.ticks // 10)
     faults, resident = page_faults(), resident_kib()
+    rows: list[tuple[int, float, int, int]] = []
     print("  ticks  page faults per 1,000  resident KiB  grown KiB")
     for number in range(1, 10 * tenth + 1):
         now = simulation.began + number * rover.PERIOD_NS
@@ -57,8 +58,22 @@ def main() -> None:
         if number % tenth == 0:
             before, faults = faults, page_faults()
             then, resident = resident, resident_kib()
-            print(f"{number:7d} {1e3 * (faults - before) / tenth:22.2f} {resident:13d} {resident - then:10d}")
-    print(f"{time.strftime('%H:%M')}, {machine()}")
+            rows.append((number, 1e3 * (faults - before) / tenth, resident, resident - then))
+            print("{:7d} {:22.2f} {:13d} {:10d}".format(*rows[-1]), flush=True)
+    write("memory", table(rows, arguments.particles))
+
+
+def table(rows: list[tuple[int, float, int, int]], particles: int) -> str:
+    lines = [
+        f"The loop as fast as it goes, {particles:,} particles at most, four ranges in each tick.",
+        "",
+        "| ticks | page faults per 1,000 | resident KiB | grown KiB |",
+        "|---|---|---|---|",
+    ]
+    lines += [
+        f"| {ticks:,} | {faults:.2f} | {resident:,} | {grown:,} |" for ticks, faults, resident, grown in rows
+    ]
+    return "\n".join([*lines, "", f"Machine: {machine()}. By `python benchmarks/memory.py`."])
 
 
 def page_faults() -> int:
