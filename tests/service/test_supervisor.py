@@ -59,8 +59,9 @@ class Service:
         self.pids: set[int] = set()
 
     def _read_notifications(self) -> None:
-        while message := self.notify.recv(4096):
-            self.notifications.put(message.decode())
+        with contextlib.suppress(OSError):  # closed under it at the end
+            while message := self.notify.recv(4096):
+                self.notifications.put(message.decode())
 
     def write(self, *programs: dict[str, Any]) -> None:
         self.specification.write_text(json.dumps(programs))
