@@ -6,7 +6,6 @@ A row is one command, run as a user would; where its recording is absent, the ro
 from __future__ import annotations
 
 import argparse
-import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,11 +14,12 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "accuracy.md"
+import measuring
+from measuring import ROOT
+
 DATA = Path("../shared/data")
 OUT = Path("out/accuracy")
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+TABLE = ("<!-- measured: begin -->", "<!-- measured: end -->")
 HEAD = (
     "recording",
     "RMSE, m",
@@ -222,15 +222,16 @@ def ended(summary: dict[str, Any]) -> str:
 
 
 def measured(row: Row, seeds: int) -> str:
-    """Run a row's command and return its line."""
+    """Run a row's command, keep what it counted for the calibration, and return its line."""
     row.prepare()
-    command = [str(Path(sys.executable).with_name("beliefd")), *row.command, "--seeds", str(seeds), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
-    shown = f"`beliefd {' '.join(row.command)} --seeds {seeds}`"
-    if done.returncode != 0:
-        said = " ".join(done.stderr.split()) or f"exit {done.returncode}"
+    command = [*row.command, "--seeds", str(seeds)]
+    said = measuring.told(command)
+    shown = f"`beliefd {' '.join(command)}`"
+    if isinstance(said, str):
         return f"| {row.name} | {' | '.join('–' * (len(HEAD) - 2))} | {shown}: {said[-120:]} |"
-    summary = json.loads(done.stdout)["summary"]
+    if row.command[0] == "replay":
+        measuring.keep("recordings", row.name, said, command)
+    summary = said["summary"]
     shadow = summary["shadow"] | {"seeds": seeds}
     cells = (
         row.name,
@@ -248,10 +249,13 @@ def measured(row: Row, seeds: int) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def standing(text: str) -> dict[str, str]:
-    """Return the lines of the table that stands in the page, by their first cell."""
-    lines = text.split(BEGIN)[1].split(END)[0].splitlines()
-    return {line.split("|")[1].strip(): line for line in lines if line.startswith("|")}
+def write(name: str, line: str) -> None:
+    """Put one line into the page; the others stay as they stand."""
+    with measuring.alone():
+        rows = [row for row in measuring.standing(TABLE).splitlines() if row.startswith("|")]
+        lines = {row.split("|")[1].strip(): row for row in rows} | {name: line}
+        head = f"| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}"
+        measuring.put(TABLE, "\n".join([head, *(lines[row.name] for row in ROWS if row.name in lines)]))
 
 
 def main() -> None:
@@ -260,20 +264,10 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--only", default="", help="rows whose name holds this")
     options = parser.parse_args()
-    text = PAGE.read_text(encoding="utf-8")
-    lines = standing(text)
     for row in ROWS:
         if options.only in row.name and all((ROOT / path).is_file() for path in row.needs):
             print(row.name, flush=True)
-            lines[row.name] = measured(row, options.seeds)
-            PAGE.write_text(rewritten(text, lines), encoding="utf-8")
-
-
-def rewritten(text: str, lines: dict[str, str]) -> str:
-    """Return the page with its table made anew of ``lines``."""
-    head = f"| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}"
-    table = "\n".join([head, *(lines[row.name] for row in ROWS if row.name in lines)])
-    return f"{text.split(BEGIN)[0]}{BEGIN}\n{table}\n{END}{text.split(END)[1]}"
+            write(row.name, measured(row, options.seeds))
 
 
 if __name__ == "__main__":

@@ -1,33 +1,30 @@
 """Measure whether what is claimed is observed, and what each mechanism is worth: ``make honesty`` (``SEEDS=5``).
 
-Every scenario and every recording that is there is run by the command that a user would type, and what it counted is
-kept in honesty.json: where a recording is absent, what was measured last stands. Of that are made the calibration
-curves (honesty-calibration.svg) and two tables of accuracy.md. ``--only NAME`` measures what holds that name,
-``--draw-only`` nothing.
+Every scenario is run by the command that a user would type, and what it counted is kept in honesty.json, beside what
+``make accuracy`` counted of the recordings: where one is absent, what was measured last stands. Of that are made the
+calibration curves (honesty-calibration.svg) and three tables of accuracy.md. ``--only NAME`` measures what holds that
+name, ``--draw-only`` nothing.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import accuracy
 import matplotlib as mpl
+import measuring
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 FOLDER = Path(__file__).parent
-KEPT = FOLDER / "honesty.json"
 PICTURE = FOLDER / "honesty-calibration.svg"
 CALIBRATION = ("<!-- calibration: begin -->", "<!-- calibration: end -->")
+CHECKS = ("<!-- checks: begin -->", "<!-- checks: end -->")
 ABLATION = ("<!-- ablation: begin -->", "<!-- ablation: end -->")
 SCENARIOS = ("beacons", "mirror", "kidnap", "late_fix", "spoof", "multipath", "slip", "jam", "outage")
 SWITCHES = ("hypotheses", "recovery", "trust", "motion_mode", "noise_learning")
@@ -41,55 +38,28 @@ COLOURS = ("#2166ac", "#d95f02", "#1b7837", "#b2182b", "#7b3294", "#666666", "#0
 DASHES = ("-", "--", ":")
 
 
-def told(arguments: list[str]) -> dict[str, Any] | None:
-    """Run ``beliefd`` and return the object that it prints; ``None``, and a line, where it failed."""
-    command = [str(Path(sys.executable).with_name("beliefd")), *arguments, "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=accuracy.ROOT)
-    if done.returncode != 0:
-        print(f"  beliefd {' '.join(arguments)}: {' '.join(done.stderr.split())[-200:]}", flush=True)
-        return None
-    return json.loads(done.stdout)
-
-
-def kept_of(said: dict[str, Any], command: list[str]) -> dict[str, Any]:
-    """Return what is kept of the runs of one command."""
-    summary = said["summary"]
-    levels = [run["levels"] for run in said["runs"] if run["levels"]]
-    names = ("rmse_m", "max_m", "nees_mean", "log_score", "coverage_50", "coverage_95", "coverage_99")
-    return {
-        "command": "beliefd " + " ".join(command),
-        "levels": np.sum(levels, axis=0).tolist() if levels else [],
-        "nees_bounds": summary["nees_bounds"],
-        "checks": {name: [one["passed"], one["of"]] for name, one in summary["checks"].items()},
-        **{name: summary[name] for name in names if name in summary},
-    }
-
-
 def wanted(seeds: int) -> Iterator[tuple[str, str, list[str]]]:
     """Yield every measurement: which part of the file, its name there, the command."""
     for name in SCENARIOS:
         yield "scenarios", name, ["scenario", name, "--seeds", str(seeds)]
-    for row in accuracy.ROWS:
-        if row.command[0] == "replay" and all((accuracy.ROOT / path).is_file() for path in row.needs):
-            row.prepare()
-            yield "recordings", row.name, [*row.command, "--seeds", str(seeds)]
     for switch in SWITCHES:
         for name in SCENARIOS:
             command = ["scenario", name, "--seeds", str(seeds), "--without", switch]
             yield f"without {switch}", name, command
 
 
-def measure(kept: dict[str, Any], seeds: int, only: str, part_only: str) -> None:
+def measure(seeds: int, only: str, part_only: str) -> None:
     """Run what is wanted, and write down each result as it comes."""
     for part, name, command in wanted(seeds):
         if only not in name or part_only not in part:
             continue
         print(f"{part}: {name}", flush=True)
-        said = told(command)
-        if said is not None:
-            kept.setdefault(part, {})[name] = kept_of(said, command)
-            KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
-            write_page(kept)
+        said = measuring.told(command)
+        if isinstance(said, str):
+            print(f"  beliefd {' '.join(command)}: {said}", flush=True)
+            continue
+        measuring.keep(part, name, said, command)
+        write_page()
 
 
 def curve(levels: list[int]) -> np.ndarray:
@@ -224,19 +194,22 @@ def metres(value: float) -> str:
     return f"{value:.2f} m" if value < 10.0 else f"{value:.0f} m"
 
 
-def between(text: str, markers: tuple[str, str], table: str) -> str:
-    """Return the page with what stands between two markers made anew."""
-    begin, end = markers
-    return f"{text.split(begin)[0]}{begin}\n{table}\n{end}{text.split(end)[1]}"
+def questions(kept: dict[str, Any]) -> str:
+    """Return the table of what each scenario asks, and how often it was so."""
+    lines = ["| scenario | what it asks | seeds in which it was so |", "|---|---|---|"]
+    for name, one in kept.get("scenarios", {}).items():
+        lines += [f"| `{name}` | {check} | {was} of {of} |" for check, (was, of) in one["checks"].items()]
+    return "\n".join(lines)
 
 
-def write_page(kept: dict[str, Any]) -> None:
-    """Write both tables into the page, and the picture beside it."""
-    text = accuracy.PAGE.read_text(encoding="utf-8")
-    text = between(text, CALIBRATION, calibration(kept))
-    text = between(text, ABLATION, ablation(kept))
-    accuracy.PAGE.write_text(text, encoding="utf-8")
-    draw(kept)
+def write_page() -> None:
+    """Write the tables into the page, and the picture beside it."""
+    with measuring.alone():
+        kept = measuring.everything()
+        measuring.put(CALIBRATION, calibration(kept))
+        measuring.put(CHECKS, questions(kept))
+        measuring.put(ABLATION, ablation(kept))
+        draw(kept)
 
 
 def main() -> None:
@@ -245,16 +218,13 @@ def main() -> None:
         description="Draw the calibration and write its tables into accuracy.md."
     )
     parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--only", default="", help="scenarios and recordings whose name holds this")
-    parser.add_argument(
-        "--part", default="", help="parts whose name holds this: scenarios, recordings, without"
-    )
+    parser.add_argument("--only", default="", help="scenarios whose name holds this")
+    parser.add_argument("--part", default="", help="parts whose name holds this: scenarios, without")
     parser.add_argument("--draw-only", action="store_true", help="measure nothing")
     options = parser.parse_args()
-    kept: dict[str, Any] = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.is_file() else {}
     if not options.draw_only:
-        measure(kept, options.seeds, options.only, options.part)
-    write_page(kept)
+        measure(options.seeds, options.only, options.part)
+    write_page()
 
 
 if __name__ == "__main__":
