@@ -1,6 +1,6 @@
 """The governor: how many particles the next tick can pay for.
 
-Every stage that works on particles has a *shape*, ``overhead + per_particle * count``, measured once on this
+Every stage that works on particles has a *shape*, ``constant + slope * count``, measured once on this
 machine before the first tick (:mod:`service.rehearsal`): the cost of a tick with one measurement. What it costs in
 operation is divided along its shape into a constant and a slope, which is exact at the count that it was measured
 at, whatever the shape; a wrong one only makes the way to the right count longer. With the stages that no particle
@@ -37,6 +37,7 @@ from math import inf
 from typing import NamedTuple
 
 from service.estimator.course import CROWD, Cause, Level
+from service.estimator.stopwatch import KALMAN, WITNESSES
 from service.quantile import RunningQuantile
 from service.tick_costs import FREE, PROBABILITY, WINDOW, Line, TickCosts
 
@@ -62,17 +63,11 @@ WAITING = 0.9
 LEAST_SHARE = 0.25
 """Of the budget, what is spent however long ticks wait: few particles do not make others faster."""
 
-WITNESSES = "witnesses"
-"""The stage of what goes beside the particles with each measurement and each move: trust, motion mode, hypotheses."""
-
 PER_MEASUREMENT = ("motion", "sensing", "resampling", WITNESSES)
 """Stages whose cost grows with the number of measurements, too."""
 
 CLOUD = "cloud"
 """The stage that level 3 leaves out."""
-
-KALMAN = "kalman"
-"""The stage of level 4; its shape is over measurements, not particles."""
 
 FIXED = ("ingest", "search", "publishing", "other")
 """Stages whose cost grows neither with the count nor with the measurements."""
@@ -89,24 +84,7 @@ COLD_MEASUREMENTS = 2
 """Measurements of a tick before the first one."""
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """How the cost of a stage depends on the count: seconds per tick, and seconds per particle and tick."""
-
-    overhead: float
-    per_particle: float
-
-    def at(self, count: int) -> float:
-        """Return the cost at ``count`` particles, seconds."""
-        return self.overhead + self.per_particle * count
-
-    def split(self, seconds: float, count: int) -> Line:
-        """Divide what was measured at ``count`` particles into a constant and a slope, in this shape's proportion."""
-        scale = seconds / self.at(count)
-        return Line(scale * self.overhead, scale * self.per_particle)
-
-
-PROPORTIONAL = Shape(0.0, 1.0)
+PROPORTIONAL = Line(0.0, 1.0)
 """Of a stage that nobody has measured: its whole cost is taken to grow with the count."""
 
 
@@ -155,7 +133,7 @@ class Governor:
         Seconds per tick, for everything the loop does.
     smallest, largest : int
         Bounds of the count, whatever the budget says.
-    shapes : Mapping[str, Shape]
+    shapes : Mapping[str, Line]
         Of the stages that work on particles, in a tick with one measurement, as far as they were measured; and of
         ``kalman`` over measurements, without which level 4 is never taken.
     period : float
@@ -168,7 +146,7 @@ class Governor:
     """
 
     def __init__(
-        self, budget: float, smallest: int, largest: int, shapes: Mapping[str, Shape], period: float = inf
+        self, budget: float, smallest: int, largest: int, shapes: Mapping[str, Line], period: float = inf
     ) -> None:
         if budget <= 0.0:
             raise ValueError(f"the budget must be more than 0 seconds per tick, got {budget}")
@@ -196,11 +174,10 @@ class Governor:
         """Return what ticks are taken to cost before the first one."""
         each, rest = FREE, FREE
         for stage, shape in self._shapes.items():
-            line = Line(COLD * shape.overhead, COLD * shape.per_particle)
             if stage in PER_MEASUREMENT:
-                each = each.plus(line)
+                each = each.plus(shape.times(COLD))
             else:
-                rest = rest.plus(line)
+                rest = rest.plus(shape.times(COLD))
         return TickCosts(rest, each, COLD_MEASUREMENTS)
 
     def observe(self, costs: Mapping[str, float], count: int, offered: int, weighed: int) -> None:
@@ -283,7 +260,7 @@ class Governor:
         """Seconds to keep for what follows the weighing of ``count`` particles: resampling, extraction, the sending."""
         after = sum(scale.value * self._shapes[stage].at(count) for stage, scale in self._after.items())
         if self._rung.level is Level.KALMAN and self._deputy is not None:
-            after = self._deputy_scale.value * self._deputy.overhead
+            after = self._deputy_scale.value * self._deputy.constant
         return after + self._publishing.value + self._cloud.value
 
     def decide(self, demand: int) -> Decision:
@@ -321,8 +298,8 @@ class Governor:
         if self._deputy is None:
             return 0
         scale = self._deputy_scale.value
-        spare = left - scale * self._deputy.overhead
-        each = scale * self._deputy.per_particle
+        spare = left - scale * self._deputy.constant
+        each = scale * self._deputy.slope
         return max(0, min(CROWD, int(spare / each) if each > 0.0 else CROWD))
 
     def _climb(self, wanted: Rung) -> None:

@@ -24,10 +24,12 @@ from service.debt import Debt
 from service.decisions import DecisionSender
 from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Hypotheses, Sensors, SensorStatus
 from service.estimator.course import Course, Level
-from service.governor import CLOUD, KALMAN, Decision, Governor, Shape
+from service.estimator.stopwatch import KALMAN
+from service.governor import CLOUD, Decision, Governor
 from service.inlet import Inlet
 from service.orders import Orders
 from service.schedule import NANOSECONDS, Schedule
+from service.tick_costs import Line
 
 INGEST_SHARE = 0.5
 """Share of the budget that taking samples may use in one tick, all links together; the rest waits."""
@@ -90,7 +92,7 @@ class Loop:
         Queue to the publisher.
     heart : Heart
         Line to the supervisor.
-    shapes : Mapping[str, Shape]
+    shapes : Mapping[str, Line]
         What the stages cost in the rehearsal, for the governor to start from.
     decisions : DecisionSender, optional
         Where a record of every tick goes.
@@ -108,7 +110,7 @@ class Loop:
         inlets: Sequence[Inlet],
         outlet: Outlet,
         heart: Heart,
-        shapes: Mapping[str, Shape],
+        shapes: Mapping[str, Line],
         decisions: DecisionSender | None = None,
         orders: Orders | None = None,
         checkpoints: Checkpoints | None = None,

@@ -36,7 +36,9 @@ from drivers.sample import (
 from service.budget import Meters
 from service.config import Configuration, Sensor, Start
 from service.estimator import Cause, Course, Estimator, Level
-from service.governor import KALMAN, PER_MEASUREMENT, WHOLE, WITNESSES, Rung, Shape
+from service.estimator.stopwatch import KALMAN, WITNESSES
+from service.governor import PER_MEASUREMENT, WHOLE, Rung
+from service.tick_costs import Line
 
 PARTICLE_STAGES = ("motion", "sensing", "resampling", "extraction")
 
@@ -60,7 +62,7 @@ _LEAST = 1e-11
 """Seconds per particle below which no slope is believed: the fastest kernel needs more for one load."""
 
 
-def rehearse(configuration: Configuration) -> dict[str, Shape]:
+def rehearse(configuration: Configuration) -> dict[str, Line]:
     """Run a second of ticks with few and with many particles, and with none; return the shapes of the stages.
 
     Each tick has a reading of every sensor. What grows with their number is divided by it: the shapes are those of a
@@ -76,12 +78,11 @@ def rehearse(configuration: Configuration) -> dict[str, Shape]:
         if cheap[stage] > 0.0 and dear[stage] > 0.0
     }
     if cheap[WITNESSES] > 0.0 and "extraction" in shapes:
-        shapes[WITNESSES] = Shape(cheap[WITNESSES], shapes["extraction"].per_particle)
+        shapes[WITNESSES] = Line(cheap[WITNESSES], shapes["extraction"].slope)
     measurements = max(1, _measurements(configuration))
     for stage in PER_MEASUREMENT:
         if stage in shapes:
-            whole = shapes[stage]
-            shapes[stage] = Shape(whole.overhead / measurements, whole.per_particle / measurements)
+            shapes[stage] = shapes[stage].times(1.0 / measurements)
     return shapes | deputy(configuration)
 
 
@@ -89,7 +90,7 @@ def _measurements(configuration: Configuration) -> int:
     return sum(len(_readings(sensor, configuration, 0.0)) for sensor in configuration.sensor)
 
 
-def deputy(configuration: Configuration) -> dict[str, Shape]:
+def deputy(configuration: Configuration) -> dict[str, Line]:
     """Return the shape of the Kalman filter that stands in for the particles, over the measurements of a tick."""
     measurements = _measurements(configuration)
     if measurements == 0:
@@ -106,12 +107,12 @@ def touch(configuration: Configuration) -> None:
         costs(configuration, few, rung, _BRIEF)
 
 
-def line(few: int, cheap: float, many: int, dear: float) -> Shape:
+def line(few: int, cheap: float, many: int, dear: float) -> Line:
     """Return the line through two points, or the nearest that neither falls nor starts below zero."""
     if many == few:
-        return Shape(0.0, max(dear / many, _LEAST))
+        return Line(0.0, max(dear / many, _LEAST))
     slope = min(max((dear - cheap) / (many - few), _LEAST), dear / many)
-    return Shape(max(dear - slope * many, 0.0), slope)
+    return Line(max(dear - slope * many, 0.0), slope)
 
 
 def costs(

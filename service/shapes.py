@@ -16,8 +16,8 @@ from pathlib import Path
 import msgspec
 
 from service.config import Configuration
-from service.governor import Shape
 from service.rehearsal import rehearse, touch
+from service.tick_costs import Line
 
 _PREFIX = "cost"
 """Changes when the shapes' meaning does: what an older version has kept is not taken for this one's."""
@@ -28,7 +28,7 @@ _KEPT = 16
 _log = logging.getLogger(__name__)
 
 
-def shapes_of(configuration: Configuration, folder: Path) -> dict[str, Shape]:
+def shapes_of(configuration: Configuration, folder: Path) -> dict[str, Line]:
     """Return the shapes that ``folder`` has for ``configuration``, or measure and keep them.
 
     Either way every kernel, import and page that a tick needs has been used once.
@@ -47,20 +47,20 @@ def _digest(configuration: Configuration) -> str:
     return hashlib.sha256(configuration.model_dump_json().encode()).hexdigest()[:12]
 
 
-def _read(path: Path) -> dict[str, Shape]:
+def _read(path: Path) -> dict[str, Line]:
     """Return what a file says; nothing if there is none, or none that can be believed."""
     try:
-        shapes = msgspec.json.decode(path.read_bytes(), type=dict[str, Shape])
+        shapes = msgspec.json.decode(path.read_bytes(), type=dict[str, Line])
     except (OSError, msgspec.DecodeError):
         return {}
     whole = all(
-        isfinite(shape.at(1)) and shape.overhead >= 0.0 and shape.per_particle >= 0.0 and shape.at(1) > 0.0
+        isfinite(shape.at(1)) and shape.constant >= 0.0 and shape.slope >= 0.0 and shape.at(1) > 0.0
         for shape in shapes.values()
     )
     return shapes if whole else {}
 
 
-def _keep(path: Path, shapes: dict[str, Shape]) -> None:
+def _keep(path: Path, shapes: dict[str, Line]) -> None:
     """Write a file at once or not at all, and remove the oldest; without it the next start measures again."""
     part = path.with_suffix(f".{os.getpid()}")
     try:

@@ -45,6 +45,10 @@ class Line(NamedTuple):
         """Return the cost at ``count`` particles, seconds."""
         return self.constant + self.slope * count
 
+    def split(self, seconds: float, count: int) -> Line:
+        """Divide what was measured at ``count`` particles into a constant and a slope, in this line's proportion."""
+        return self.times(seconds / self.at(count))
+
 
 FREE = Line(0.0, 0.0)
 

@@ -68,8 +68,8 @@ def figures(points: Sequence[Point], rates: Sequence[float], share: float) -> di
         ],
         "stages": {
             stage: {
-                "overhead_us": round(1e6 * s.overhead, 1),
-                "ns_per_particle": round(1e9 * s.per_particle, 2),
+                "overhead_us": round(1e6 * s.constant, 1),
+                "ns_per_particle": round(1e9 * s.slope, 2),
             }
             for stage, s in shapes(points).items()
         },
@@ -96,7 +96,7 @@ def show(points: Sequence[Point], rates: Sequence[float], share: float, console:
         )
     stages = _table("its stages", "stage", "overhead µs", "ns per particle")
     for stage, shape in shapes(points).items():
-        stages.add_row(stage, f"{1e6 * shape.overhead:.0f}", f"{1e9 * shape.per_particle:.2f}")
+        stages.add_row(stage, f"{1e6 * shape.constant:.0f}", f"{1e9 * shape.slope:.2f}")
     fits = _table(f"what fits, at {share:.0%} of a processor", "rate Hz", "budget ms", "particles")
     for rate in rates:
         count = affordable(points, share / rate)

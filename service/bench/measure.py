@@ -13,8 +13,8 @@ from itertools import pairwise
 from statistics import median
 
 from service.config import Configuration
-from service.governor import Shape
 from service.rehearsal import costs, line
+from service.tick_costs import Line
 
 COUNTS = (200, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000)
 ROUNDS = 3
@@ -59,7 +59,7 @@ def _point(count: int, rounds: list[dict[str, float]]) -> Point:
     return Point(count, stages, median(totals), min(totals), max(totals))
 
 
-def shapes(points: Sequence[Point]) -> dict[str, Shape]:
+def shapes(points: Sequence[Point]) -> dict[str, Line]:
     """Return overhead and cost per particle of every stage: the line through the first and the last point."""
     first, last = points[0], points[-1]
     return {

@@ -26,7 +26,7 @@ from service.estimator.caution import caution_of
 from service.estimator.companion import Companion, Watched
 from service.estimator.course import CROWD, Cause, Course, Level
 from service.estimator.deputy import Deputy
-from service.estimator.fusion import KALMAN, Fusion
+from service.estimator.fusion import Fusion
 from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
 from service.estimator.jumps import Jumps
@@ -39,7 +39,7 @@ from service.estimator.resuming import begin_again, kept_of
 from service.estimator.search import Search
 from service.estimator.start import Anchor, draw
 from service.estimator.starting import Starter
-from service.estimator.stopwatch import Silent, Stopwatch
+from service.estimator.stopwatch import KALMAN, Silent, Stopwatch
 from service.estimator.track import SECOND
 from service.estimator.trust import trust_of
 from service.estimator.vehicle import Vehicle, vehicle_of

@@ -21,7 +21,7 @@ from service.estimator.latecomers import Latecomers
 from service.estimator.population import Population
 from service.estimator.records import SensorRecord
 from service.estimator.search import Search
-from service.estimator.stopwatch import Stopwatch
+from service.estimator.stopwatch import KALMAN, WITNESSES, Stopwatch
 from service.estimator.thinning import spaced
 from service.estimator.track import SECOND
 from service.estimator.trust import Trust
@@ -36,12 +36,6 @@ TOGETHER = SECOND // 1000
 
 FEW = 8
 """Up to a few measurements per tick are weighed each at its own time; more of them share four times."""
-
-KALMAN = "kalman"
-"""The stage that the deputy's work is charged to, whatever it is."""
-
-WITNESSES = "witnesses"
-"""The stage of those who go beside the particles: who watches over the sensors, the motion and the hypotheses."""
 
 OUTLIER = 0.5
 """Probability of being the outlier part's from which a measurement counts as refused: it moved next to nothing."""

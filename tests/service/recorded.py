@@ -14,17 +14,17 @@ from service.checkpoint import Kept
 from service.config import Configuration, validated
 from service.decisions import DecisionSender
 from service.estimator import Estimator
-from service.governor import Shape
 from service.inlet import Inlet
 from service.loop import Loop
 from service.orders import Orders
 from service.recorder import Recorder, run_recording
 from service.records import Doubled, begun, tell
+from service.tick_costs import Line
 
 RATE = 100.0
 BEACONS = {1: (20.0, 10.0), 2: (-5.0, 20.0), 3: (30.0, -15.0)}
 LINKS = ("radio", "bus")
-SHAPES = {stage: Shape(1e-5, 2e-8) for stage in ("motion", "sensing", "resampling", "extraction")}
+SHAPES = {stage: Line(1e-5, 2e-8) for stage in ("motion", "sensing", "resampling", "extraction")}
 ORDER = b'{"mode": "given", "position": [4.0, 1.0, 0.0], "heading": 0.1}'
 
 

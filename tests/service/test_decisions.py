@@ -27,11 +27,11 @@ from service.decisions import (
 )
 from service.estimate import Estimate
 from service.estimator import Cause, Estimator, Level
-from service.governor import Shape
 from service.inlet import Inlet
 from service.loop import Loop
 from service.publish.inbox import parse
 from service.recorder import Recorder, decision_log
+from service.tick_costs import Line
 
 RATE = 100.0
 BEACONS = {1: (20.0, 10.0), 2: (-5.0, 20.0), 3: (30.0, -15.0)}
@@ -108,7 +108,7 @@ def test_a_recorded_run_gives_the_same_bytes_again(configuration: Configuration,
     loop = Loop(
         configuration, estimator, meters, [Inlet(name, ends.inlet) for name, ends in links.items()],
         Outlet(estimates.outlet), Heart(heart.outlet),
-        {stage: Shape(1e-5, 2e-8) for stage in ("motion", "sensing", "resampling", "extraction")},
+        {stage: Line(1e-5, 2e-8) for stage in ("motion", "sensing", "resampling", "extraction")},
         DecisionSender(Outlet(records.outlet), len(links)),
     )  # fmt: skip
     began = time.monotonic_ns()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from service.estimator import Cause, Level
-from service.governor import COLD, COLD_MEASUREMENTS, GROWTH, SETTLE, Decision, Governor, Shape
-from service.tick_costs import WINDOW
+from service.governor import COLD, COLD_MEASUREMENTS, GROWTH, SETTLE, Decision, Governor
+from service.tick_costs import WINDOW, Line
 
 BUDGET = 4e-3
 SMALLEST, LARGEST = 200, 1_000_000
@@ -17,7 +17,7 @@ FIXED = 0.4e-3
 STAGES = {"motion": 3e-9, "sensing": 6e-9, "resampling": 5e-9, "extraction": 2e-9}
 OVERHEAD = 20e-6
 PER_PARTICLE = sum(STAGES.values())
-SHAPES = {stage: Shape(OVERHEAD, slope) for stage, slope in STAGES.items()}
+SHAPES = {stage: Line(OVERHEAD, slope) for stage, slope in STAGES.items()}
 AFFORDABLE = (BUDGET - FIXED - len(STAGES) * OVERHEAD) / PER_PARTICLE
 
 
@@ -131,7 +131,7 @@ def test_stages_that_peak_apart_are_not_paid_for_together() -> None:
 
     The sum of the stages' own high quantiles would be 6 ms, and starve it. Closed form.
     """
-    shapes = SHAPES | {"witnesses": Shape(2e-4, 2e-9)}
+    shapes = SHAPES | {"witnesses": Line(2e-4, 2e-9)}
     governor = Governor(BUDGET, SMALLEST, LARGEST, shapes)
     for tick in range(2 * WINDOW):
         dear = ("ingest", "witnesses", "publishing")[tick % 3]
@@ -156,7 +156,7 @@ def test_the_first_measurement_is_not_the_price_of_each() -> None:
 
 def test_a_tick_that_was_cut_had_too_many_particles() -> None:
     """Every second tick is cut after 2 of 4 measurements: the count falls to what all four of them leave room for."""
-    governor = Governor(BUDGET, SMALLEST, LARGEST, {"sensing": Shape(1e-5, 5e-9)})
+    governor = Governor(BUDGET, SMALLEST, LARGEST, {"sensing": Line(1e-5, 5e-9)})
     counts: list[int] = []
     for _ in range(4 * WINDOW):
         count = governor.decide(LARGEST).count
@@ -221,8 +221,8 @@ def test_one_early_exception_does_not_rule() -> None:
     assert governor.decide(LARGEST) == before
 
 
-@pytest.mark.parametrize("wrong", [Shape(0.0, 1.0), Shape(5e-5, 1e-9), Shape(1e-6, 1e-6)])
-def test_a_wrong_shape_still_leads_to_the_right_count(wrong: Shape) -> None:
+@pytest.mark.parametrize("wrong", [Line(0.0, 1.0), Line(5e-5, 1e-9), Line(1e-6, 1e-6)])
+def test_a_wrong_shape_still_leads_to_the_right_count(wrong: Line) -> None:
     """From shapes that are off by orders of magnitude, the count ends where the budget does."""
     governor = Governor(BUDGET, SMALLEST, LARGEST, dict.fromkeys(STAGES, wrong))
     counts, costs = Machine(noise=0.02).run(governor, 2_000)
@@ -274,7 +274,7 @@ class Vehicle:
 
 
 def only_sensing(period: float = 1.0) -> Governor:
-    return Governor(BUDGET, SMALLEST, LARGEST, {"sensing": Shape(1e-4, 1e-7)}, period)
+    return Governor(BUDGET, SMALLEST, LARGEST, {"sensing": Line(1e-4, 1e-7)}, period)
 
 
 @pytest.mark.parametrize(
@@ -313,15 +313,15 @@ def test_what_is_not_measured_any_more_is_tried_again() -> None:
 @pytest.mark.parametrize(
     ("cost", "level", "most"),
     [
-        (Shape(0.4e-3, 0.2e-3), Level.KALMAN, 5),  # twice its shape until it is known: (3 ms - 0.8) / 0.4
-        (Shape(0.4e-3, 1.2e-3), Level.PREDICTION_ONLY, 0),  # 0.8 + 2.4 ms do not go into 3
+        (Line(0.4e-3, 0.2e-3), Level.KALMAN, 5),  # twice its shape until it is known: (3 ms - 0.8) / 0.4
+        (Line(0.4e-3, 1.2e-3), Level.PREDICTION_ONLY, 0),  # 0.8 + 2.4 ms do not go into 3
     ],
 )
 def test_a_kalman_filter_takes_over_where_it_fits_and_particles_do_not(
-    cost: Shape, level: Level, most: int
+    cost: Line, level: Level, most: int
 ) -> None:
     """Closed form: 4 ms less 1 ms fixed; with the fewest particles one measurement costs 3.5."""
-    shapes = {"sensing": Shape(1e-4, 1e-7), "kalman": cost}
+    shapes = {"sensing": Line(1e-4, 1e-7), "kalman": cost}
     governor, vehicle = Governor(BUDGET, SMALLEST, LARGEST, shapes, 1.0), Vehicle(1e-3, 0.1e-3, 3.5e-3)
     decisions = [vehicle.tick(governor)[0] for _ in range(6)]
     assert (decisions[-1].level, decisions[-1].most) == (level, most)
@@ -332,8 +332,8 @@ def test_a_kalman_filter_hands_back_when_particles_have_become_cheap() -> None:
 
     It takes 10 µs and what it measures of itself is twice its shape, so it always fits.
     """
-    cost = Shape(5e-6, 5e-6)
-    governor = Governor(BUDGET, SMALLEST, LARGEST, {"sensing": Shape(1e-4, 1e-7), "kalman": cost}, 1.0)
+    cost = Line(5e-6, 5e-6)
+    governor = Governor(BUDGET, SMALLEST, LARGEST, {"sensing": Line(1e-4, 1e-7), "kalman": cost}, 1.0)
     vehicle = Vehicle(1e-3, 0.1e-3, 3.5e-3)
     vehicle.run(governor, 10)
     levels: list[Level] = []
@@ -385,7 +385,7 @@ def test_the_count_turns_no_more_often_than_it_may() -> None:
 
 def test_others_on_the_processor_cost_particles() -> None:
     """Ticks that wait 8 ms of a period of 10 have 1 ms left; with 20 ms of waiting a quarter of the budget stays."""
-    shapes = {"sensing": Shape(0.0, 1e-7)}
+    shapes = {"sensing": Line(0.0, 1e-7)}
     for wait, room in ((8e-3, 1e-3), (20e-3, 0.25 * BUDGET), (1e-3, BUDGET)):
         governor = Governor(BUDGET, SMALLEST, LARGEST, shapes, 10e-3)
         for _ in range(WINDOW):
@@ -397,7 +397,7 @@ def test_others_on_the_processor_cost_particles() -> None:
 
 
 def test_others_alone_never_starve_it() -> None:
-    governor = Governor(BUDGET, 7_500, LARGEST, {"sensing": Shape(0.0, 1e-7)}, 10e-3)
+    governor = Governor(BUDGET, 7_500, LARGEST, {"sensing": Line(0.0, 1e-7)}, 10e-3)
     for _ in range(WINDOW):
         governor.observe_wait(1.0)
     decision = governor.decide(LARGEST)

@@ -20,10 +20,10 @@ from service.channels import Heart, Outlet, Pair, pair, undertaking
 from service.config import Configuration, load
 from service.estimate import Budget, Cloud, Estimate, Health, HealthState, Hypotheses, Sensors, SensorStatus
 from service.estimator import Course, Level
-from service.governor import Shape
 from service.inlet import Inlet
 from service.loop import Loop
 from service.publish.inbox import Value, parse
+from service.tick_costs import Line
 
 RATE = 100.0
 TOML = """
@@ -107,7 +107,7 @@ class Rig:
             self.inlets,
             Outlet(self.estimates.outlet),
             Heart(self.heart.outlet),
-            {"motion": Shape(1e-5, 1e-9)},
+            {"motion": Line(1e-5, 1e-9)},
         )
 
     def run(self, ticks: int) -> None:

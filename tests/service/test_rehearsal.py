@@ -48,8 +48,8 @@ def test_every_stage_is_run_and_has_a_shape(tmp_path: Path, most: int) -> None:
     path.write_text(TOML.format(most=most))
     shapes = rehearse(load(path))
     assert set(shapes) == {*PARTICLE_STAGES, "witnesses", "kalman"}
-    assert 0.0 < shapes["witnesses"].per_particle <= shapes["extraction"].per_particle
-    assert all(shape.per_particle > 0.0 and shape.overhead >= 0.0 for shape in shapes.values())
+    assert 0.0 < shapes["witnesses"].slope <= shapes["extraction"].slope
+    assert all(shape.slope > 0.0 and shape.constant >= 0.0 for shape in shapes.values())
 
 
 @given(st.floats(0.0, 1e-2), st.floats(1e-10, 1e-5), st.integers(10, 1000), st.integers(1001, 10**6))
@@ -63,6 +63,6 @@ def test_the_line_goes_through_both_points(overhead: float, slope: float, few: i
 def test_no_line_falls_or_starts_below_zero(cheap: float, dear: float, few: int, more: int) -> None:
     """Whatever noise did to the two measurements, the line is exact at the larger count or just above."""
     found = line(few, cheap, few + more, dear)
-    assert found.per_particle > 0.0
-    assert found.overhead >= 0.0
+    assert found.slope > 0.0
+    assert found.constant >= 0.0
     assert found.at(few + more) == pytest.approx(dear, rel=1e-9, abs=2e-5)

@@ -8,10 +8,10 @@ import msgspec
 import pytest
 
 from service.config import Configuration, validated
-from service.governor import Shape
 from service.shapes import shapes_of
+from service.tick_costs import Line
 
-KEPT = {"motion": Shape(1e-5, 2e-9), "kalman": Shape(1e-4, 3e-5)}
+KEPT = {"motion": Line(1e-5, 2e-9), "kalman": Line(1e-4, 3e-5)}
 
 
 def configuration(sigma: float = 0.3) -> Configuration:
@@ -42,7 +42,14 @@ def test_another_configuration_is_measured_by_itself(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "content",
-    [b"", b"{", b'{"motion": 3}', b'{"motion": {"overhead": -1.0, "per_particle": 1e-9}}', b"{}"],
+    [
+        b"",
+        b"{",
+        b"{}",
+        b'{"motion": 3}',
+        b'{"motion": [-1.0, 1e-9]}',
+        b'{"motion": {"overhead": 1e-5, "per_particle": 1e-9}}',  # as an older version wrote it
+    ],
 )
 def test_a_file_that_cannot_be_believed_is_measured_anew(tmp_path: Path, content: bytes) -> None:
     shapes_of(configuration(), tmp_path)

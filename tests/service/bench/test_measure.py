@@ -33,7 +33,7 @@ def test_less_than_the_least_affords_nothing() -> None:
 
 def test_a_stage_is_a_line() -> None:
     shape = shapes(line())["motion"]
-    assert (shape.overhead, shape.per_particle) == pytest.approx((OVERHEAD, SLOPE))
+    assert (shape.constant, shape.slope) == pytest.approx((OVERHEAD, SLOPE))
 
 
 def test_the_figures_are_one_json_object_in_their_units() -> None:
