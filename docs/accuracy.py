@@ -30,6 +30,7 @@ HEAD = (
     "EKF: inside 95 %",
     "end of the blanking",
     "tracking",
+    "alarms",
     "speed",
     "command",
 )
@@ -221,6 +222,14 @@ def ended(summary: dict[str, Any]) -> str:
     return said
 
 
+def alarms(runs: list[dict[str, Any]]) -> str:
+    """Return how often, in all runs together, a sensor was flagged or the estimate jumped, and how long it was lost."""
+    flags, resets = sum(len(run["flags"]) for run in runs), sum(run["resets"] for run in runs)
+    lost = sum(run["health_seconds"].get("lost", 0.0) for run in runs)
+    counts = ((flags, f"{flags} flags"), (resets, f"{resets} jumps"), (lost, f"lost {lost:.1f} s"))
+    return ", ".join(said for count, said in counts if count) or "none"
+
+
 def measured(row: Row, seeds: int) -> str:
     """Run a row's command, keep what it counted for the calibration, and return its line."""
     row.prepare()
@@ -243,6 +252,7 @@ def measured(row: Row, seeds: int) -> str:
         spread(shadow, "coverage_95", "{:.1%}", "mean"),
         ended(summary),
         f"{summary['health'].get('tracking', 0.0):.1%}, after {spread(summary, 'tracked_after_s', '{:.0f}', 'mean')} s",
+        alarms(said["runs"]),
         "x" + spread(summary, "real_time_factor", "{:.0f}", "min"),
         shown,
     )
