@@ -54,7 +54,7 @@ class Pace(NamedTuple):
     warm: int
 
 
-STEADY = Pace(50, 20_000_000, 20)
+STEADY = Pace(30, 20_000_000, 10)
 _BRIEF = Pace(12, 100_000_000, 12)
 _SPEED = 1.0
 _FEW = 4
@@ -63,7 +63,7 @@ _LEAST = 1e-11
 
 
 def rehearse(configuration: Configuration) -> dict[str, Line]:
-    """Run a second of ticks with few and with many particles, and with none; return the shapes of the stages.
+    """Run some ticks with few and with many particles, and with none; return the shapes of the stages.
 
     Each tick has a reading of every sensor. What grows with their number is divided by it: the shapes are those of a
     tick with one measurement. The witnesses hardly notice the count, but now and then one of them begins anew as the

@@ -1,8 +1,9 @@
 """What the stages of a tick cost on this machine, measured once and kept beside the compiled kernels.
 
-A rehearsal takes longer than all else of a start. So its result is kept, in a file for each configuration, in a folder
-for each version of the kernels and processor. The next start only touches what a tick needs. That the machine was busy
-when it was measured does not matter: the governor learns the costs in operation as multiples of these.
+A rehearsal takes a good part of a start. So its result is kept, in a file for each configuration (for what a tick can
+cost of it), in a folder for each version of the kernels and processor. The next start only touches what a tick needs.
+That the machine was busy when it was measured does not matter: the governor learns the costs in operation as multiples
+of these.
 """
 
 from __future__ import annotations
@@ -22,6 +23,17 @@ from service.tick_costs import Line
 _PREFIX = "cost"
 """Changes when the shapes' meaning does: what an older version has kept is not taken for this one's."""
 
+_COSTLESS: dict[str, bool | set[str]] = {
+    "vehicle": {"name"},
+    "origin": True,
+    "start": True,
+    "link": True,
+    "loop": {"priority", "cpus"},
+    "publish": True,
+    "state": True,
+}
+"""What of a configuration a rehearsal does not use: who changes it need not wait for another."""
+
 _KEPT = 16
 """Files that a folder keeps: the newest."""
 
@@ -34,9 +46,9 @@ def shapes_of(configuration: Configuration, folder: Path) -> dict[str, Line]:
     Either way every kernel, import and page that a tick needs has been used once.
     """
     path = folder / f"{_PREFIX}-{_digest(configuration)}.json"
+    touch(configuration)
     kept = _read(path)
     if kept:
-        touch(configuration)
         return kept
     shapes = rehearse(configuration)
     _keep(path, shapes)
@@ -44,7 +56,8 @@ def shapes_of(configuration: Configuration, folder: Path) -> dict[str, Line]:
 
 
 def _digest(configuration: Configuration) -> str:
-    return hashlib.sha256(configuration.model_dump_json().encode()).hexdigest()[:12]
+    costly = configuration.model_dump_json(exclude=_COSTLESS)
+    return hashlib.sha256(costly.encode()).hexdigest()[:12]
 
 
 def _read(path: Path) -> dict[str, Line]:

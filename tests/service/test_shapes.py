@@ -14,11 +14,11 @@ from service.tick_costs import Line
 KEPT = {"motion": Line(1e-5, 2e-9), "kalman": Line(1e-4, 3e-5)}
 
 
-def configuration(sigma: float = 0.3) -> Configuration:
+def configuration(sigma: float = 0.3, port: int = 0, name: str = "test") -> Configuration:
     file = {
-        "vehicle": {"name": "test"},
+        "vehicle": {"name": name},
         "budget": {"particles_min": 50, "particles_max": 100},
-        "link": [{"name": "l", "kind": "mavlink", "url": "udpin:127.0.0.1:0"}],
+        "link": [{"name": "l", "kind": "mavlink", "url": f"udpin:127.0.0.1:{port}"}],
         "sensor": [{"kind": "range", "sigma": sigma}],
         "beacon": [{"id": 1, "position": [5.0, 5.0, 0.0]}],
     }
@@ -38,6 +38,13 @@ def test_another_configuration_is_measured_by_itself(tmp_path: Path) -> None:
     path.write_bytes(msgspec.json.encode(KEPT))
     assert shapes_of(configuration(0.3), tmp_path) == KEPT
     assert shapes_of(configuration(0.4), tmp_path) != KEPT
+
+
+def test_what_costs_nothing_may_change(tmp_path: Path) -> None:
+    shapes_of(configuration(), tmp_path)
+    (path,) = tmp_path.iterdir()
+    path.write_bytes(msgspec.json.encode(KEPT))
+    assert shapes_of(configuration(port=14550, name="another"), tmp_path) == KEPT
 
 
 @pytest.mark.parametrize(
