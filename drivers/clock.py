@@ -15,7 +15,8 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-SECOND = 1_000_000_000
+from drivers.sample import SECOND
+
 DRIFT = 100e-6  # crystals are within 50 ppm, cheap resonators within 100
 BUCKET = 15 * SECOND  # half of the window that the envelope remembers
 ENOUGH_IN_BUCKET = 20  # a bucket with fewer arrivals has not seen a quick one: silence forgets nothing

@@ -15,6 +15,9 @@ from collections.abc import Sequence
 
 import msgspec
 
+SECOND = 1_000_000_000
+"""Nanoseconds in a second, on every clock here."""
+
 Vector = tuple[float, float, float]
 
 

@@ -24,14 +24,14 @@ import zenoh
 
 from drivers.foreign import MalformedSample, decode, host_time
 from drivers.link import LinkError
-from drivers.sample import LinkReport, Sample
+from drivers.sample import SECOND, LinkReport, Sample
 
 MOST_SENSORS = 64
 LONGEST_NAME = 64
 
 _STEP = 0.002
 _MOST_PER_POLL = 512
-_SILENT_NS = 1_000_000_000
+_SILENT_NS = SECOND
 _CLOSING = 1.0
 
 

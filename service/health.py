@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from drivers.sample import SECOND
 from service.estimate import HealthState
 
-SECOND = 1_000_000_000
 CONVERGED_RADIUS = 10.0
 """Metres of ``radius95`` below which a belief that had no place yet has one."""
 

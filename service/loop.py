@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.sample import Sample
+from drivers.sample import SECOND, Sample
 from service.budget import Meters
 from service.channels import BUDGET, ESTIMATE, HEALTH, HYPOTHESES, SENSORS, Heart, Outlet, cloud
 from service.checkpoint import Checkpoints
@@ -28,7 +28,7 @@ from service.estimator.stopwatch import KALMAN
 from service.governor import CLOUD, Decision, Governor
 from service.inlet import Inlet
 from service.orders import Orders
-from service.schedule import NANOSECONDS, Schedule
+from service.schedule import Schedule
 from service.tick_costs import Line
 
 INGEST_SHARE = 0.5
@@ -134,7 +134,7 @@ class Loop:
         self._taken = [0] * len(inlets)
         self._booked = 0
         slices = max(1, len(inlets))
-        self._slice_ns = round(INGEST_SHARE * self._budget_ms * 1e-3 * NANOSECONDS / slices)
+        self._slice_ns = round(INGEST_SHARE * self._budget_ms * 1e-3 * SECOND / slices)
         self._second = max(1, round(self._rate))
         self._beat_every = max(1, round(self._rate / BEAT_RATE))
         self._hypotheses_every = max(1, round(self._rate / HYPOTHESES_RATE))
@@ -166,11 +166,11 @@ class Loop:
             ahead = deadline - time.monotonic_ns()
             if ahead > 0:
                 # From Python 3.11 on this is clock_nanosleep to an absolute time of the monotonic clock.
-                time.sleep(ahead / NANOSECONDS)
+                time.sleep(ahead / SECOND)
             began = time.monotonic_ns()
             self.tick(began)
             ended = time.monotonic_ns()
-            self._account((began - deadline) / NANOSECONDS, (ended - began) / NANOSECONDS)
+            self._account((began - deadline) / SECOND, (ended - began) / SECOND)
             self._schedule.advance(time.monotonic_ns())
 
     def tick(self, now_ns: int) -> Estimate:
@@ -236,7 +236,7 @@ class Loop:
         elif phase == self._second // 2:
             self._send(SENSORS, self.sensors(estimate.time, now_ns))
         elif phase == 3 * self._second // 4 and self._checkpoints is not None:
-            self._checkpoints.send(now_ns, round(estimate.time * NANOSECONDS))
+            self._checkpoints.send(now_ns, round(estimate.time * SECOND))
         if self.ticks % self._hypotheses_every == 0 and estimate.level < Level.NO_CLOUD:
             hypotheses = self._estimator.hypotheses(estimate.time)
             if hypotheses is not None:

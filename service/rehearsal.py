@@ -17,6 +17,7 @@ import msgspec
 
 from drivers.maps import landmarks
 from drivers.sample import (
+    SECOND,
     Altitude,
     AnyReading,
     Bearing,
@@ -128,7 +129,7 @@ def costs(
     course = Course()
     now = 0
     for tick in range(pace.ticks):
-        now = 1_000_000_000 + tick * pace.period
+        now = SECOND + tick * pace.period
         meters.begin()
         datagram = decode(encode(SampleBatch(list(_samples(configuration, now)))))
         if isinstance(datagram, SampleBatch):

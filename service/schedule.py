@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-NANOSECONDS = 1_000_000_000
+from drivers.sample import SECOND
 
 
 class Schedule:
@@ -38,11 +38,11 @@ class Schedule:
     @property
     def deadline_ns(self) -> int:
         """When the tick to do next is due."""
-        return self._start_ns + round(self._tick * NANOSECONDS / self._rate)
+        return self._start_ns + round(self._tick * SECOND / self._rate)
 
     def advance(self, now_ns: int) -> None:
         """Go on to the tick after this one, or to the last that is due already."""
-        due = int((now_ns - self._start_ns) * self._rate / NANOSECONDS)
+        due = int((now_ns - self._start_ns) * self._rate / SECOND)
         following = max(self._tick + 1, due)
         self.missed += following - self._tick - 1
         self._tick = following

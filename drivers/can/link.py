@@ -19,7 +19,7 @@ from drivers.can.frame import CanFrame
 from drivers.can.multicast import MulticastBus
 from drivers.can.settings import CanSettings
 from drivers.link import LinkError
-from drivers.sample import LinkReport, Sample
+from drivers.sample import SECOND, LinkReport, Sample
 
 MULTICAST = "mcast"
 SERIAL = "slcan"
@@ -30,7 +30,7 @@ logging.getLogger("can").setLevel(logging.CRITICAL)
 
 _MOST_PER_POLL = 512
 _MOST_DAMAGED = 1_000
-_SILENT_NS = 1_000_000_000
+_SILENT_NS = SECOND
 _BUS_OFF = 0x40  # CAN_ERR_BUSOFF of linux/can/error.h, an error frame's class
 
 # Interfaces that filter before a frame reaches Python; for the others the decoder's own look is cheaper.

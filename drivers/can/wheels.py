@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivers.sample import Odometer
+from drivers.sample import SECOND, Odometer
 
-SECOND = 1_000_000_000
 LONGEST_GAP = SECOND // 2
 """Longer than this without a message, nobody knows how far a wheel has rolled."""
 FASTEST = 100.0  # m/s: a counter that runs faster has started anew

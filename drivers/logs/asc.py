@@ -15,8 +15,8 @@ from typing import BinaryIO
 from drivers.can import CanFrame
 from drivers.can.frame import LARGEST_EXTENDED, LARGEST_STANDARD
 from drivers.logs.canlog import LoggedFrame, Tally, lines
+from drivers.sample import SECOND
 
-_SECOND = 1_000_000_000
 _BASE = re.compile(rb"base\s+(?P<base>hex|dec)(?:\s+timestamps\s+(?P<stamps>absolute|relative))?.*", re.I)
 _DATE = re.compile(rb"(?:date|begin\s+triggerblock)\s+(?:[A-Za-z]{2,3}\s+)?(?P<date>\S.*)", re.I)
 _EVENT = re.compile(rb"(?P<seconds>\d{1,11})\.(?P<fraction>\d{1,9})\s+(?P<rest>\S.*)")
@@ -53,7 +53,7 @@ def unix_of(date: str) -> int | None:
         except ValueError:
             continue
         whole = round((moment.replace(microsecond=0) - datetime(1970, 1, 1, tzinfo=UTC)).total_seconds())
-        return max(0, whole * _SECOND + moment.microsecond * 1_000)
+        return max(0, whole * SECOND + moment.microsecond * 1_000)
     return None
 
 
@@ -115,7 +115,7 @@ def frames(file: BinaryIO, tally: Tally) -> Iterator[LoggedFrame]:
             known = not line or line[:2] == b"//" or head.read(line) or line[:1].isalpha()
             tally.refused["bad_line"] += not known
             continue
-        stamp = int(event["seconds"]) * _SECOND + int(event["fraction"].ljust(9, b"0"))
+        stamp = int(event["seconds"]) * SECOND + int(event["fraction"].ljust(9, b"0"))
         since = since + stamp if head.relative else stamp
         try:
             found = frame_of(event["rest"], head.base)

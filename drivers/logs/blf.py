@@ -18,6 +18,7 @@ from drivers.can import CanFrame
 from drivers.can.frame import LARGEST_EXTENDED
 from drivers.logs.canlog import LoggedFrame, Tally
 from drivers.logs.log_file import lost
+from drivers.sample import SECOND
 
 FILE_MAGIC = b"LOGG"
 _MAGIC = b"LOBJ"
@@ -58,7 +59,7 @@ def _start_of(header: bytes, tally: Tally) -> int:
         start = datetime(year, month, day, hour, minute, second, tzinfo=UTC)
     except ValueError:
         return 0
-    return max(0, int(start.timestamp())) * 1_000_000_000 + milliseconds * 1_000_000
+    return max(0, int(start.timestamp())) * SECOND + milliseconds * 1_000_000
 
 
 def _inflate(content: bytes, compression: int, tally: Tally) -> tuple[bytes, bool]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections import Counter
 
-from drivers.clock import SECOND
 from drivers.link import LinkError
 from drivers.mavlink.address import open_port
 from drivers.mavlink.decode import Decoder
@@ -18,7 +17,7 @@ from drivers.mavlink.settings import MavlinkSettings
 from drivers.mavlink.signing import SignatureCheck, read_key
 from drivers.mavlink.speaker import Speaker
 from drivers.mavlink.timesync import TimeSync, TimeSynchroniser
-from drivers.sample import LinkReport, Sample
+from drivers.sample import SECOND, LinkReport, Sample
 
 HEARTBEAT_PERIOD = SECOND
 SILENT_AFTER = 3 * SECOND

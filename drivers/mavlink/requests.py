@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-from drivers.clock import SECOND
 from drivers.mavlink.dialect import IDENTIFIERS
+from drivers.sample import SECOND
 
 SET_MESSAGE_INTERVAL = 511
 ACCEPTED, TEMPORARILY_REJECTED, IN_PROGRESS = 0, 1, 5  # MAV_RESULT

@@ -8,8 +8,8 @@ nothing.
 
 from __future__ import annotations
 
-from drivers.clock import SECOND
 from drivers.mavlink.frames import Frame
+from drivers.sample import SECOND
 
 NUMBERS = 256
 LARGEST_GAP = NUMBERS // 2  # a number further ahead lies behind: it was overtaken

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-from drivers.clock import SECOND, DeviceClocks
+from drivers.clock import DeviceClocks
+from drivers.sample import SECOND
 
 QUICK = SECOND // 10
 SLOW = SECOND

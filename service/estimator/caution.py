@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from drivers.sample import SECOND
 from filters.belief import Evidence
 from filters.kalman import Matrix
 from filters.linearised.bank import BATCHED
@@ -21,7 +22,6 @@ from filters.sensing import PositionMeasurement, RangeMeasurement
 from service.config import Configuration
 from service.estimator.ground import GroundVehicle
 from service.estimator.measuring import Measurement
-from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 from service.estimator.witnesses import gaussian_of
 

@@ -8,7 +8,7 @@ of a moment stays as it is: the ranges of one round are better weighed together.
 
 from __future__ import annotations
 
-from service.estimator.track import SECOND
+from drivers.sample import SECOND
 
 PATIENCE = 2 * SECOND
 """Beyond the horizon's own wait: who has said nothing for so long is not waited for."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.sample import AnyReading
+from drivers.sample import SECOND, AnyReading
 from filters.belief import Belief, Displacement, Joint, Moments
 from filters.density.gaussian import radius
 from filters.motion.constant_velocity import (
@@ -36,7 +36,6 @@ from service.estimator.carrier import Carrier, Pose
 from service.estimator.controls import Controls, controls_of
 from service.estimator.height import Height, climb_of, down_of, height_of, height_state
 from service.estimator.start import Anchor, altitude_biases, sensor_states
-from service.estimator.track import SECOND
 from service.geodesy import LocalFrame
 
 _PLANE = ("north", "east", VELOCITY_NORTH, VELOCITY_EAST)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, Protocol
 
-from drivers.sample import AnyReading
+from drivers.sample import SECOND, AnyReading
 from filters.belief import Belief, Displacement, Moments
 from filters.density.gaussian import radius
 from filters.motion.learned import SlowState
@@ -20,7 +20,7 @@ from service.estimator.carrier import Carrier, Pose
 from service.estimator.controls import Controls, controls_of
 from service.estimator.height import Height, down_of, height_of
 from service.estimator.start import Anchor, sensor_states
-from service.estimator.track import SECOND, SPEED_WINDOW
+from service.estimator.track import SPEED_WINDOW
 from service.geodesy import LocalFrame
 
 UNKNOWN_SPEED = 2.0

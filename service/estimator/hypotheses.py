@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.sample import SECOND
 from filters.belief import Displacement, Evidence
 from filters.hypotheses import Hypotheses
 from filters.labelled_moments import Hypothesis
 from filters.particle import ParticleFilter
 from service.estimator.measuring import Measurement
-from service.estimator.track import SECOND
 
 Array = NDArray[np.float64]
 

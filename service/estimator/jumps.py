@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 
+from drivers.sample import SECOND
 from service.estimate import Estimate, HealthState
-from service.estimator.track import SECOND
 
 FAR = 5.0
 """Metres."""

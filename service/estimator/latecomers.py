@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from drivers.sample import SECOND
 from filters.belief import Displacement, Evidence
 from filters.motion.unicycle import GYRO_BIAS, ODOMETRY_SCALE
 from filters.particle import ParticleFilter
@@ -20,7 +21,6 @@ from service.config import Configuration
 from service.estimator.ground import GroundVehicle
 from service.estimator.intake import Waiting
 from service.estimator.measuring import Measurement
-from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 
 MEMORY = 12_000_000

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from collections import deque
 
+from drivers.sample import SECOND
 from filters.binary import BinaryBayesFilter
-from service.estimator.track import SECOND
 from service.estimator.witnesses import Testimony
 
 BASE = 2 * SECOND

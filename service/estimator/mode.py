@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from drivers.sample import SECOND
 from filters.belief import Evidence
 from filters.discrete import DiscreteBayesFilter
 from filters.kalman import Matrix
@@ -29,7 +30,6 @@ from service.config import Configuration
 from service.estimate import MotionMode
 from service.estimator.ground import GroundVehicle
 from service.estimator.measuring import Measurement
-from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 from service.estimator.witnesses import gaussian_of
 

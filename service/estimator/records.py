@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from drivers.sample import SECOND
 from service.estimate import SensorStatus
-from service.estimator.track import SECOND
 
 MOST_RECORDS = 256
 OTHERS = "others"

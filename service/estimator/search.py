@@ -24,6 +24,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.sample import SECOND
 from filters.belief import Evidence, Moments
 from filters.linearised.shadow import LINEARISED
 from filters.recovery import AugmentedRecovery, expected_log_evidence
@@ -35,7 +36,6 @@ from service.estimator.hearing import Heard, Likelihood
 from service.estimator.measuring import Measurement
 from service.estimator.quest import POINTS, Box, Quest
 from service.estimator.start import MARGINALISED
-from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 from service.estimator.way import way_of
 

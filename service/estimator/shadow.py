@@ -12,12 +12,12 @@ from collections import Counter
 
 import numpy as np
 
+from drivers.sample import SECOND
 from filters.belief import Evidence
 from filters.linearised.shadow import LINEARISED, ShadowFilter
 from service.estimator.binding import Measurement
 from service.estimator.carrier import Pose
 from service.estimator.companion import Watched
-from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 
 

@@ -5,9 +5,9 @@ Used where a speed is a measurement and where several make the control; each spe
 
 from __future__ import annotations
 
-from drivers.sample import AnyReading, MotorSpeed, Odometer, Speed
+from drivers.sample import SECOND, AnyReading, MotorSpeed, Odometer, Speed
 from service.config import Sensor
-from service.estimator.track import FASTEST, GAP, SECOND
+from service.estimator.track import FASTEST, GAP
 
 NO_RADIUS, NO_WHEEL = "no_wheel_radius", "no_such_wheel"
 FIRST, OUT_OF_ORDER = "first_count", "out_of_order"

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from drivers.sample import GeodeticPosition, LocalPosition
+from drivers.sample import SECOND, GeodeticPosition, LocalPosition
 from service.config import Configuration
 from service.estimator.binding import position_of
 from service.estimator.controls import Controls
 from service.estimator.intake import Intake, Passed, Waiting
 from service.estimator.start import Anchor
-from service.estimator.track import SECOND
 from service.geodesy import Geodetic
 
 STALE = 5 * SECOND

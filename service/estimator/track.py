@@ -10,7 +10,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
 
-SECOND = 1_000_000_000
+from drivers.sample import SECOND
+
 GAP = SECOND // 2
 """A rate is taken to hold for this long; what lies beyond is unknown."""
 

@@ -14,11 +14,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.sample import SECOND
 from filters.motion.unicycle import GYRO_BIAS, ODOMETRY_SCALE
 from service.config import Configuration
 from service.estimator.free import FreeVehicle
 from service.estimator.ground import GroundVehicle
-from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 
 Array = NDArray[np.float64]

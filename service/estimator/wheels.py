@@ -11,10 +11,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from drivers.sample import Sample
+from drivers.sample import SECOND, Sample
 from service.config import Sensor
 from service.estimator.speedometer import Speedometer, matches
-from service.estimator.track import GAP, SECOND
+from service.estimator.track import GAP
 
 DEFAULT_SIGMA = 0.2
 """m/s; of a sensor of which neither the configuration nor the reading says how good it is."""

@@ -10,11 +10,10 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple, get_args
 
-from drivers.sample import Sample
+from drivers.sample import SECOND, Sample
 from service.config.belief import SensorKind
 from service.estimator.binding import takes
 
-SECOND = 1_000_000_000
 _FORM = re.compile(r"(?P<what>[^\s:]+):(?P<first>\d+(?:\.\d*)?)-(?P<last>\d+(?:\.\d*)?)?")
 
 

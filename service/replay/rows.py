@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from types import TracebackType
 
+from drivers.sample import SECOND
 from service.estimate import Estimate
 
 HEADER = (
@@ -22,7 +23,7 @@ def row(estimate: Estimate, unix: int) -> str:
     e = estimate
     covariance = e.position_covariance
     cells = (
-        f"{unix // 1_000_000_000}.{unix % 1_000_000_000 // 1000:06d}",
+        f"{unix // SECOND}.{unix % SECOND // 1000:06d}",
         *(_cell(value, 4) for value in e.position),
         _cell(e.heading, 6),
         *(_cell(value, 4) for value in e.velocity),

@@ -16,14 +16,14 @@ from pathlib import Path
 import msgspec
 
 from drivers.logs import LogReader
-from drivers.sample import LinkReport
+from drivers.sample import SECOND, LinkReport
 from service.checks import Check, Story, Teller
 from service.config import Configuration
 from service.decisions import Decided
 from service.estimate import Estimate
 from service.estimator import Estimator
 from service.estimator.shadow import Shadow
-from service.replay.blanking import SECOND, Blank, Seeing
+from service.replay.blanking import Blank, Seeing
 from service.replay.comparing import Again, Comparing
 from service.replay.outage import Outage, outages_of
 from service.replay.recorded import RecordedRun, recorded_ticks

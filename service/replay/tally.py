@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from drivers.sample import SECOND
 from service.estimate import Estimate, HealthState, Hypotheses
 from service.estimator.shadow import Shadow
-from service.estimator.track import SECOND
 from service.mixture import Mixture
 from service.score import UNSCORED, Comparison, Score, Track, Truth, compare, figures
 

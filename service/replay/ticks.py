@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from drivers.sample import Sample
+from drivers.sample import SECOND, Sample
 from service.config import Start
 from service.decisions import Decided
 from service.estimator import Course
 
-SECOND = 1_000_000_000
 SILENCE_LIMIT = 600 * SECOND
 """A log with a hole longer than this was spliced; ticks are not made up through it."""
 

@@ -16,10 +16,10 @@ from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from drivers.foreign import MalformedSample, decode
 from drivers.logs.log_file import LogFile, lost
 from drivers.logs.recording.writer import ENCODING, LINK, ORDER, SOURCE, TAKEN, TOPIC
-from drivers.sample import LinkReport, Sample
+from drivers.sample import SECOND, LinkReport, Sample
 
 LARGEST_RECORD = 1 << 28
-SETTLING = 1_000_000_000
+SETTLING = SECOND
 """Nanoseconds that a sample may have been measured after it came, where a live clock mapping settled."""
 
 _LATEST = 1 << 62

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any, cast
 
-from drivers.sample import MotorSpeed, Odometer
+from drivers.sample import SECOND, MotorSpeed, Odometer
 from drivers.sample import Speed as SpeedReading
 from filters.motion.constant_velocity import VELOCITY_NORTH
 from filters.sensing.speed import GroundSpeed, GroundSpeedMeasurement, WheelSpeed, WheelSpeedMeasurement
@@ -18,7 +18,7 @@ from service.config import Sensor
 from service.estimator.measuring.kind import Bound, Kind, Place, Surroundings
 from service.estimator.speedometer import Speedometer
 from service.estimator.start import slow_state
-from service.estimator.track import SECOND, SPEED_WINDOW
+from service.estimator.track import SPEED_WINDOW
 from service.estimator.wheels import CORRELATION, DEFAULT_SIGMA
 
 SPAN = 100.0

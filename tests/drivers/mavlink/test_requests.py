@@ -4,7 +4,6 @@ from itertools import pairwise
 
 import pytest
 
-from drivers.clock import SECOND
 from drivers.mavlink.requests import (
     ACCEPTED,
     ANSWER_WITHIN,
@@ -17,6 +16,7 @@ from drivers.mavlink.requests import (
     MessageRequests,
     StreamRequest,
 )
+from drivers.sample import SECOND
 
 ATTITUDE, WHEELS, RPM, BEACON = 30, 9000, 226, 513
 DENIED, UNSUPPORTED, FAILED = 2, 3, 4

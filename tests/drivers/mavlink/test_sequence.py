@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.clock import SECOND
 from drivers.mavlink.frames import Frame, frame_at
 from drivers.mavlink.sequence import Sequences
+from drivers.sample import SECOND
 from tests.drivers.mavlink.wire import attitude, frame_1, raw_frame
 
 STEP = SECOND // 100

@@ -2,8 +2,9 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from drivers.clock import EXCHANGES_NEEDED, SECOND, DeviceClocks
+from drivers.clock import EXCHANGES_NEEDED, DeviceClocks
 from drivers.mavlink.timesync import PATIENCE, TimeSync, TimeSynchroniser
+from drivers.sample import SECOND
 
 
 def test_a_request_is_answered_with_our_clock_and_theirs() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.sample import LocalPosition, Sample
+from drivers.sample import SECOND, LocalPosition, Sample
 from filters.belief import Evidence
 from filters.motion.standing import StandingUnicycle
 from filters.motion.unicycle import UnicycleControl
@@ -23,7 +23,6 @@ from filters.sensing import (
     VelocityMeasurement,
 )
 from service.estimator.measuring import Measurement
-from service.estimator.track import SECOND
 
 STEP = 0.2
 SPEED = 1.5

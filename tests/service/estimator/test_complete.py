@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.sample import SECOND
 from service.estimator.complete import MOMENT, PATIENCE, Complete
-from service.estimator.track import SECOND
 
 LONG = 100 * SECOND
 

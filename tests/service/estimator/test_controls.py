@@ -7,6 +7,7 @@ import math
 import pytest
 
 from drivers.sample import (
+    SECOND,
     ActuatorCommand,
     AnyReading,
     Attitude,
@@ -20,7 +21,6 @@ from drivers.sample import (
     Speed,
 )
 from service.estimator.controls import SILENCE, Controls, Throttle
-from service.estimator.track import SECOND
 
 MS = 1_000_000
 

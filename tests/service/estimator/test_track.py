@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.estimator.track import GAP, SECOND, RateTrack, TotalTrack
+from drivers.sample import SECOND
+from service.estimator.track import GAP, RateTrack, TotalTrack
 
 MS = 1_000_000
 

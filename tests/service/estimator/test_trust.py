@@ -12,11 +12,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from drivers.sample import SECOND
 from filters.kalman import Matrix
 from service.estimator import witnesses
 from service.estimator.lie import Lie
 from service.estimator.measuring import Measurement
-from service.estimator.track import SECOND
 from service.estimator.trust import Trust, group_of
 from tests.service.estimator.driving import STEP, Drive
 
