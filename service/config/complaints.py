@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from service.config import structure
+from service.config.described import description
 from service.config.places import place_in_words
 from service.config.section import Section, shown
 
@@ -97,9 +98,9 @@ def _described(error: ErrorDetails, root: type[Section]) -> str:
     said = words(error)
     if error["type"] == "missing":
         section = structure.at(root, place[:-1])
-        field = section.model_fields.get(str(place[-1])) if section else None
-        if field and field.description:
-            said += f": {field.description}"
+        meaning = description(section, str(place[-1])) if section else ""
+        if meaning:
+            said += f": {meaning}"
     return said
 
 

@@ -12,6 +12,7 @@ from typing import Any, cast
 from service.config import structure
 from service.config.checks import NOT_BUILT, NOT_READ
 from service.config.configuration import Configuration
+from service.config.described import description
 from service.config.section import Section
 
 _INTRODUCTION = """\
@@ -98,8 +99,8 @@ def _rows(path: str, section: type[Section]) -> Iterator[str]:
             continue
         facts = cast("Schema", schema["properties"][name])
         default = "**required**" if name in required and not _filled_in(section, name) else _default(facts)
-        description = " ".join((field.description or "").split()) + _planned(path, name)
-        yield f"| `{name}` | {_type(facts)} | {default} | {description} |"
+        meaning = " ".join(description(section, name).split()) + _planned(path, name)
+        yield f"| `{name}` | {_type(facts)} | {default} | {meaning} |"
 
 
 def _filled_in(section: type[Section], name: str) -> bool:

@@ -17,7 +17,7 @@ from pydantic_core import PydanticCustomError
 class Section(BaseModel):
     """One table of the file: frozen, and no key but its own."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
