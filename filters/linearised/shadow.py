@@ -122,18 +122,21 @@ class ShadowFilter:
     def initialize(self, moments: Moments) -> None:
         """Start from the moments of another belief, such as the particle filter's.
 
+        Dimensions that follow its own are left out.
+
         Raises
         ------
         ValueError
             Moments of other dimensions, or that are no Gaussian's; the belief is unchanged then.
         """
-        if moments.names != self.names:
+        size = len(self.names)
+        if moments.names[:size] != self.names:
             raise ValueError(
                 f"shadow filter: moments of {', '.join(self.names)} are needed, got {', '.join(moments.names)}"
             )
-        covariance = np.diag(np.asarray(moments.variance, np.float64))
+        covariance = np.diag(np.asarray(moments.variance, np.float64)[:size])
         covariance[:_POSE, :_POSE] = moments.pose_covariance
-        self._filter.set(moments.mean, covariance)
+        self._filter.set(moments.mean[:size], covariance)
         self.rejections = 0
 
     def predict(self, control: Any, duration: float) -> None:

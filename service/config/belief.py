@@ -276,5 +276,7 @@ class Honesty(Section):
     """Flag a sensor that disagrees with all others, and ignore it until it has earned trust again."""
     noise_learning: bool = True
     """Learn how much of the noise that is stated for motion and sensors there really is."""
+    lasting_errors: bool = True
+    """Learn the part of a receiver's error that lasts for a minute, beside where the vehicle is."""
     motion_mode: bool = True
     """Tell standing still and slipping from moving, and treat the odometry accordingly."""

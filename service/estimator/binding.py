@@ -25,6 +25,7 @@ from service.estimator.measuring import (
     position_of,
     surroundings_of,
 )
+from service.estimator.start import receiver_name
 
 SECOND = 1_000_000_000
 MAGNETIC_INTERVAL = SECOND // 5
@@ -102,6 +103,8 @@ class BoundSensor:
         given = settings.correlation_s
         self._correlation = self._kind.correlation if given is None else given
         self._lasts = settings.kind == "position" and self._correlation > 0.0
+        self._receiver = receiver_name(settings)
+        self._leader: tuple[str, str] | None = None
 
     def wants(self, sample: Sample) -> bool:
         """Say whether ``sample`` is this sensor's."""
@@ -161,7 +164,15 @@ class BoundSensor:
             lasting,
             self._correlation == 0.0,
             TIMING if self.delay > 0 else 0.0,
+            self._receiver if lasting > 0.0 and self._leads(sample) else None,
         )
+
+    def _leads(self, sample: Sample) -> bool:
+        """Say whether the sample is of the speaker that was heard first: each has errors of its own."""
+        speaker = (sample.link, sample.source)
+        if self._leader is None:
+            self._leader = speaker
+        return speaker == self._leader
 
     def _memory_of(self, sample: Sample, make: Callable[[Sensor, Surroundings], Any]) -> Any:
         speaker = (sample.link, sample.source)

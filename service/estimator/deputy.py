@@ -107,11 +107,10 @@ class Deputy:
         A marginalised state's variance given the path is the particles' own and stays: it is taken off here.
         """
         self._drawn += 1
-        names, covariance = self._belief.names, self._filter.covariance.copy()
+        names, covariance = self._filter.names, self._filter.covariance.copy()
         given_path = {**self._vehicle.motion.conditional_variances, **self._belief.particles.variances}
-        for name, variance in given_path.items():
-            row = names.index(name)
-            covariance[row, row] -= variance
+        for row, name in enumerate(names):
+            covariance[row, row] -= given_path.get(name, 0.0)
         random = np.random.Generator(np.random.Philox(key=(self._seed, self._drawn)))
         normals = random.standard_normal((len(names), count))
         drawn = self._filter.mean[:, None] + root(covariance) @ normals

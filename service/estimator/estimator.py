@@ -35,6 +35,7 @@ from service.estimator.latecomers import latecomers_of
 from service.estimator.mode import mode_of
 from service.estimator.output import Output
 from service.estimator.population import Population
+from service.estimator.receivers import Receivers, biases_of, learned
 from service.estimator.resuming import begin_again, kept_of
 from service.estimator.search import Search
 from service.estimator.start import Anchor, draw
@@ -79,11 +80,12 @@ class Estimator:
         self._jumps = Jumps()
         self._stopwatch: Stopwatch = stopwatch or Silent()
         self._vehicle = vehicle_of(configuration)
+        biases = biases_of(configuration)
         self._filter = ParticleFilter(
             self._vehicle.motion,
             capacity=configuration.budget.particles_max,
             seed=seed,
-            slow=self._vehicle.slow_states,
+            slow=[*self._vehicle.slow_states, *learned(biases)],
             crew=crew,
         )
         self._intake = Intake(configuration, self._vehicle.controls)
@@ -120,7 +122,12 @@ class Estimator:
         if self._tracker is not None:
             self._population.tracker = self._tracker
             self._fusion.companions.append(self._tracker)
-        lasting = Lasting()
+        receivers = None
+        if biases:
+            receivers = Receivers(biases, self._filter, configuration.start.mode == "given")
+            self._fusion.receivers = self._population.receivers = receivers
+            self._fusion.companions.append(receivers)
+        lasting = Lasting(receivers)
         self._fusion.companions.append(lasting)
         self._output = Output(self._vehicle, self._filter, self._tracker, lasting)
         self._sequence = 0
@@ -258,6 +265,8 @@ class Estimator:
             self._deputy.hand_back(self._population.clamp(self.demand, afforded))
             if self._tracker is not None and self._fusion.time is not None:
                 self._tracker.started(self._fusion.time)
+            if self._fusion.receivers is not None and self._fusion.time is not None:
+                self._fusion.receivers.started(self._fusion.time)
             self._stopwatch.lap("resampling")
 
     def _find(self, now: int, afforded: int) -> None:

@@ -19,6 +19,7 @@ from service.estimator.height import Height
 from service.estimator.intake import Intake, Passed, Waiting
 from service.estimator.latecomers import Latecomers
 from service.estimator.population import Population
+from service.estimator.receivers import Receivers
 from service.estimator.records import SensorRecord
 from service.estimator.search import Search
 from service.estimator.stopwatch import KALMAN, WITNESSES, Stopwatch
@@ -73,6 +74,8 @@ class Fusion:
         Asked before each measurement whether its sensor is believed; a companion, too.
     caution : Caution or None
         Says what a sensor's readings are worth; a companion, too.
+    receivers : Receivers or None
+        Takes what lasts of a receiver's errors for a state; a companion, too.
     latecomers : Latecomers or None
         Who weighs the belief by measurements that come after the horizon has passed them.
     taken_back : int
@@ -94,6 +97,7 @@ class Fusion:
         self.search: Search | None = None
         self.trust: Trust | None = None
         self.caution: Caution | None = None
+        self.receivers: Receivers | None = None
         self.taken_back = 0
         self.latecomers: Latecomers | None = None
         self._vehicle = vehicle
@@ -222,6 +226,8 @@ class Fusion:
         self._charge(WITNESSES)
         if not believed:
             record.refused["distrusted"] += 1
+            if self.receivers is not None:
+                self.receivers.distrusted(measured)
             return
         self._vehicle.level(self._acting, waiting.sample.reading, self._intake.frame, measured.repeats)
         self._take_evidence(time, measured, record)
@@ -268,13 +274,19 @@ class Fusion:
                     companion.started(time)
         return believed
 
+    def _worth(self, measured: Measurement) -> Measurement:
+        """Return a measurement as the belief is to be weighed by it."""
+        if self.receivers is not None and self.receivers.knows(measured) and not self._deputised:
+            return self.receivers.split(measured)
+        return measured if self.caution is None else self.caution.sized(measured)
+
     def _take_evidence(self, time: int, measured: Measurement, record: SensorRecord) -> None:
         if self.search is not None and self.search.blind:
             self.search.heard(time, measured)
             record.accepted += 1
             record.last = time
             return
-        worth = measured if self.caution is None else self.caution.sized(measured)
+        worth = self._worth(measured)
         evidence = self._acting.weigh(worth.model, worth.value)
         if not evidence.accepted:
             record.refused["invalid"] += 1

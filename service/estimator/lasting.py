@@ -19,6 +19,7 @@ from filters.density.gaussian import radius
 from filters.sensing import PositionMeasurement
 from service.estimator.carrier import Pose
 from service.estimator.measuring import Measurement
+from service.estimator.receivers import Receivers
 from service.estimator.track import SECOND
 
 DURATION = 60.0
@@ -34,7 +35,8 @@ ONE_AXIS = 0.5
 class Lasting:
     """A companion of the estimator: hears every measurement and every stretch, and widens the pose."""
 
-    def __init__(self) -> None:
+    def __init__(self, receivers: Receivers | None = None) -> None:
+        self._receivers = receivers
         self._error = LastingError(DURATION)
         self._variance = 0.0
         self._timing = 0.0
@@ -56,7 +58,8 @@ class Lasting:
         if isinstance(value, PositionMeasurement):
             self._timing = measured.timing
             gain = self._gain(value.sigma_north or 0.0)
-            if measured.lasting > 0.0:
+            known = self._receivers is not None and self._receivers.knows(measured)
+            if measured.lasting > 0.0 and not known:
                 self._error.corrected(gain, measured.lasting)
             else:
                 self._error.displaced(gain)

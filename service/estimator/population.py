@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 from filters.kld import Demand
@@ -10,6 +11,7 @@ from filters.particle import ParticleFilter
 from filters.policy import EffectiveShare, Policy, Wear, WhenStill
 from service.config import Configuration
 from service.estimator.hypotheses import Tracker
+from service.estimator.receivers import Receivers
 from service.estimator.stopwatch import Stopwatch
 from service.estimator.track import SECOND
 
@@ -56,6 +58,8 @@ class Population:
         How many the belief needs (KLD bound, and enough for each hypothesis), as reckoned last.
     tracker : Tracker or None
         Draws by hypothesis while there are several.
+    receivers : Receivers or None
+        Whose errors go with a place that is drawn anew.
     """
 
     def __init__(
@@ -73,6 +77,7 @@ class Population:
         ).particles
         self.demand = self._budget.particles_min
         self.tracker: Tracker | None = None
+        self.receivers: Receivers | None = None
         self.still: Callable[[], float] = lambda: 0.0
         self._reckoned = -(2**62)
 
@@ -95,7 +100,8 @@ class Population:
                 belief.temper(OUTLIVES)
             self.resample(afforded)
             if collapsed:
-                belief.rejuvenate(HEADING_BIN / POSITION_BIN)
+                with nullcontext() if self.receivers is None else self.receivers.kept():
+                    belief.rejuvenate(HEADING_BIN / POSITION_BIN)
         self._stopwatch.lap("resampling")
 
     def resample(self, afforded: int) -> None:

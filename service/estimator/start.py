@@ -27,6 +27,7 @@ class Anchor(NamedTuple):
 
 
 DELAY = "gnss_delay"
+RECEIVER_BIAS = "position_bias"
 """The slow state of a receiver's delay: one for its positions and its velocities, which come of the same fix."""
 
 SENSOR_WALK = 1e-4
@@ -86,6 +87,11 @@ def slow_state(sensor: Sensor, what: str) -> str:
     index = None if sensor.index is None else str(sensor.index)
     own = () if sensor.kind == "range" else (sensor.link, sensor.source, index)
     return "/".join([f"{sensor.kind}_{what}", *(part for part in own if part is not None)])
+
+
+def receiver_name(sensor: Sensor) -> str:
+    """Return what the slow states of a receiver's lasting error are named after."""
+    return slow_state(sensor, "bias")
 
 
 def learned_bias(sensor: Sensor, name: str) -> Learned:

@@ -359,7 +359,8 @@ class Trust:
         self._taken_back += 1
         random = np.random.Generator(np.random.Philox(key=(self._seed, self._taken_back)))
         drawn = mean[:, None] + root(covariance) @ random.standard_normal((mean.size, self._belief.count))
-        return dict(zip(self._belief.names, drawn, strict=True))
+        names = self._belief.names[: mean.size]  # receivers' errors come last, and stay
+        return dict(zip(names, drawn, strict=True))
 
     def _group(self, measured: Measurement, sample: Sample) -> Group | None:
         name = group_of(measured.name, sample)

@@ -24,6 +24,7 @@ from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle
 from filters.particle import ParticleFilter
 from service.estimator.measuring import Measurement
+from service.estimator.start import RECEIVER_BIAS
 from service.estimator.track import SECOND
 
 SPAN = 120 * SECOND
@@ -174,7 +175,9 @@ class Witnesses:
 
 
 def gaussian_of(belief: ParticleFilter[Any], given_path: dict[str, float]) -> tuple[Matrix, Matrix]:
-    """Return mean and covariance of a belief over all its dimensions, over an even sample of its particles.
+    """Return mean and covariance of a belief, over an even sample of its particles.
+
+    The errors of receivers, which come last, are left out: witnesses and the like do not have them as states.
 
     Parameters
     ----------
@@ -184,7 +187,8 @@ def gaussian_of(belief: ParticleFilter[Any], given_path: dict[str, float]) -> tu
     step = max(1, belief.count // SAMPLE)
     weights = belief.weights[::step].astype(np.float64)
     weights /= weights.sum()
-    columns: NDArray[np.float64] = belief.columns[:, : belief.count : step].astype(np.float64)
+    size = sum(not name.startswith(RECEIVER_BIAS) for name in belief.names)
+    columns: NDArray[np.float64] = belief.columns[:size, : belief.count : step].astype(np.float64)
     heading = columns[_HEADING]
     centre = math.atan2(weights @ np.sin(heading), weights @ np.cos(heading))
     columns[_HEADING] = centre + np.remainder(heading - centre + math.pi, 2.0 * math.pi) - math.pi

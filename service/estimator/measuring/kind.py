@@ -154,6 +154,8 @@ class Measurement(NamedTuple):
         Whether its errors are said to be independent of each other.
     timing : float
         How well the latency is known that was taken off its stamp, seconds: all its readings share that error.
+    receiver : str or None
+        What the lasting error is named after; ``None``: of a speaker that has no state of its own.
     """
 
     name: str
@@ -165,6 +167,7 @@ class Measurement(NamedTuple):
     lasting: float = 0.0
     independent: bool = False
     timing: float = 0.0
+    receiver: str | None = None
 
     def surprise(self, log_mean: float) -> float:
         """Return the probability, 0…1, that the reading is the outlier part's, given its evidence."""
