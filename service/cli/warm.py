@@ -1,4 +1,4 @@
-"""``beliefd warm``: compile the kernels ahead of the first start."""
+"""``beliefd warm``: compile the kernels ahead of the first start, and the modules where Python does not."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ def command(everything: Everything = False) -> None:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from service import kernels
+    from service import bytecode, kernels
 
+    bytecode.keep()
     warm = kernels.warm_all if everything else kernels.warm
     started = time.monotonic()
     columns = (
