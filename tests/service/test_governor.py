@@ -85,8 +85,11 @@ def test_reacts_to_doubled_cost_within_eight_ticks() -> None:
     machine.slower = 2.0
     _, costs = machine.run(governor, 200)
     assert costs[0] > 1.5 * BUDGET
-    assert costs[8:].max() < 1.1 * BUDGET
-    assert np.mean(costs[8:] > BUDGET) <= 0.1, "at first it is the quantile of few"
+    assert costs[8:].max() < 1.03 * BUDGET
+    # of k slow ticks the third largest is what fits, and one more exceeds it with probability 3 / (k + 1): together
+    # 5 % of 192, and over 30 seeds 7.8 % at most; once only slow ones are remembered, 2.4 %
+    assert np.mean(costs[8:] > BUDGET) <= 0.08
+    assert np.mean(costs[WINDOW:] > BUDGET) <= 0.05
 
 
 def test_recovers_when_the_machine_is_fast_again() -> None:
@@ -296,7 +299,9 @@ def test_gives_up_in_the_declared_order(
     assert decision.cause is (Cause.BUDGET if level else Cause.NONE)
     assert max(cost for _, cost in run[30:70]) <= BUDGET + 1e-9
     if level >= Level.THINNED:
-        assert decision.count == SMALLEST >= decision.afforded
+        assert decision.count == SMALLEST
+        first = next(found for found, _ in run if found.level is level)
+        assert first.afforded < SMALLEST  # later, what is left out fades in memory until it is tried again
 
 
 def test_what_is_not_measured_any_more_is_tried_again() -> None:
@@ -397,11 +402,13 @@ def test_others_on_the_processor_cost_particles() -> None:
 
 
 def test_others_alone_never_starve_it() -> None:
-    governor = Governor(BUDGET, 7_500, LARGEST, {"sensing": Line(0.0, 1e-7)}, 10e-3)
+    """A count whose expected measurements take three quarters of the budget stays, however long ticks wait."""
+    count = int(0.75 * BUDGET / (COLD * COLD_MEASUREMENTS * 1e-7))
+    governor = Governor(BUDGET, count, LARGEST, {"sensing": Line(0.0, 1e-7)}, 10e-3)
     for _ in range(WINDOW):
         governor.observe_wait(1.0)
     decision = governor.decide(LARGEST)
-    assert decision.count == decision.afforded == 7_500
+    assert decision.count == decision.afforded == count
     assert decision.level is Level.FEWER_PARTICLES
 
 
