@@ -48,17 +48,21 @@ def test_jamming_is_outvoted_and_said(seed: int) -> None:
     """48 s of fixes up to 2.4 km wrong that claim 0.3 m: the receiver is found out, and health does not hide it."""
     run = run_of(JAM, seed)
     assert run.score.rmse_m is not None
-    assert run.score.rmse_m <= 0.5
+    assert run.score.rmse_m <= 0.3
     assert run.score.max_m is not None
     assert run.score.max_m <= 1.0
     assert run.score.coverage_95 is not None
     assert run.score.coverage_95 >= 0.93
     refused = next(refused for name, (_, refused) in run.sensors.items() if name.startswith("position"))
-    assert refused["distrusted"] > 200
+    assert refused["distrusted"] > 200  # not one by one as outliers any more: the receiver itself is not believed
     assert 0.15 < 1.0 - run.health["tracking"] < 0.4
 
 
 def test_the_shadow_stands_beside_and_hears_what_trust_admits() -> None:
+    """It has no trust of its own: 0.32 m, for it coasts until the receiver is believed again, 0.3 with its gate alone.
+
+    A Kalman filter draws no numbers, so another seed moves this by a millimetre.
+    """
     run = run_of(JAM, 2)
     assert run.shadow.score.rmse_m is not None
     assert run.shadow.score.rmse_m <= 0.4
