@@ -54,12 +54,12 @@ def test_jamming_is_outvoted_and_said(seed: int) -> None:
     assert run.score.coverage_95 is not None
     assert run.score.coverage_95 >= 0.93
     refused = next(refused for name, (_, refused) in run.sensors.items() if name.startswith("position"))
-    assert refused["distrusted"] > 200  # not one by one as outliers any more: the receiver itself is not believed
+    assert refused["distrusted"] > 200  # no outliers one by one any more: the receiver itself is not believed
     assert 0.15 < 1.0 - run.health["tracking"] < 0.4
 
 
 def test_the_shadow_stands_beside_and_hears_what_trust_admits() -> None:
-    """It has no trust of its own: 0.32 m, for it coasts until the receiver is believed again, 0.3 with its gate alone.
+    """It has no trust of its own: 0.32 m, for it coasts until the receiver is believed again (below 0.3 by its gate alone).
 
     A Kalman filter draws no numbers, so another seed moves this by a millimetre.
     """
