@@ -59,7 +59,7 @@ def test_jamming_is_outvoted_and_said(seed: int) -> None:
 
 
 def test_the_shadow_stands_beside_and_hears_what_trust_admits() -> None:
-    """It has no trust of its own: 0.32 m, for it coasts until the receiver is believed again (below 0.3 by its gate alone).
+    """It has no trust of its own: 0.32 m, coasting until the receiver is believed again.
 
     A Kalman filter draws no numbers, so another seed moves this by a millimetre.
     """
