@@ -19,6 +19,7 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from filters.kernels import discrete as kernels
 from filters.transition import Transition, Vector, require_probabilities, transition
 
 State = TypeVar("State", bound=Hashable)
@@ -155,15 +156,17 @@ class DiscreteBayesFilter(Generic[State]):
         """
         logs = np.array(log_likelihoods, np.float64, ndmin=1)
         self._require_one_each("log likelihoods", logs)
-        if not logs.max() < math.inf:  # the largest of what holds a NaN is one
+        evidence = self._weigh(logs)
+        if math.isnan(evidence):
             raise ValueError(f"discrete filter: log likelihoods must be below infinity, got {logs.tolist()}")
-        return self._weigh(logs)
+        return evidence
 
     def _weigh(self, logs: Vector) -> float:
-        weighed = self._log_belief + logs
-        evidence = _log_sum(weighed)
+        """Weigh the belief, unless no state is left; NaN for what is no logarithm of a likelihood."""
+        weighed = np.empty(logs.size)
+        evidence = kernels.weigh.direct(self._log_belief, logs, weighed)
         if evidence > -math.inf:
-            self._log_belief = weighed - evidence
+            self._log_belief = weighed
         return evidence
 
     def _move(self, moving: Transition) -> None:

@@ -15,12 +15,14 @@ independent measurement that it is worth.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from filters.discrete import DiscreteBayesFilter
-from filters.kernels.error_level import log_likelihoods, surprise
+from filters.kernels.error_level import log_likelihoods
+from filters.kernels.testimony import hear_out
 from filters.transition import Forgetting
 
 Matrix = NDArray[np.float64]
@@ -30,6 +32,54 @@ CAUTIONS = (1.0, 0.25, 0.0625)
 
 LEVELS = (1.0, 0.25, 0.0625)
 """m, as shares of the usual level."""
+
+Expected = tuple[Matrix, Matrix, Matrix]
+
+
+class Testimony(NamedTuple):
+    """A reading beside what a Gaussian expects that has not heard of it.
+
+    Attributes
+    ----------
+    residual : (n,) float64
+        Measured minus what it expected.
+    spread : (n, n) float64
+        Covariance of what it expected.
+    noise : (n,) float64
+        Variances of the measurement, of one that repeats no other's errors.
+    """
+
+    residual: Matrix
+    spread: Matrix
+    noise: Matrix
+
+
+class Opinion(NamedTuple):
+    """What that Gaussian makes of it.
+
+    Attributes
+    ----------
+    testimony : Testimony
+        What it goes by.
+    nis : float
+        The squared residual in units of spread and noise.
+    surprise : float
+        By how many nats the residual is less likely than none, from an honest source; of the noise of several
+        components the mean is taken.
+    excuse : float
+        Nats that the noise which the reading claims takes off any evidence. A liar's measurement lies anywhere. That an
+        honest one lies at all near the prediction is the less surprising, by the logarithm of the standard deviation in
+        each dimension, the wider it says that it may lie.
+    """
+
+    testimony: Testimony
+    nis: float
+    surprise: float
+    excuse: float
+
+    def information(self, nats: float) -> float:
+        """Return what is left of ``nats`` of evidence; not below zero."""
+        return max(0.0, nats - self.excuse)
 
 
 class ErrorLevel:
@@ -68,34 +118,35 @@ class ErrorLevel:
         """Expected k: by how much the covariance of the prediction is to be scaled to be what it turned out to be."""
         return float(self._filter.belief @ self._cautions)
 
-    def surprise(self, residual: Matrix, spread: Matrix, noise: Matrix) -> float:
-        """Return by how many nats a residual is less likely than none, from an honest source.
+    def hear_out(self, expected: Expected, covariance: Matrix, member: int, repeats: float) -> Opinion:
+        """Return what a Gaussian makes of a reading.
 
         Parameters
         ----------
-        residual : (n,) float64
-            Measured minus predicted.
-        spread : (n, n) float64
-            P, in the measurement's space.
-        noise : (n,) float64
-            r; of several components the mean is taken.
+        expected : residual, jacobian, noise
+            Of many Gaussians and one reading, as :class:`filters.linearised.bank.Expectations`.
+        covariance : (B, d, d) float64
+            Of all of them.
+        member : int
+            Which of them is asked.
+        repeats : float
+            How many readings share an independent error.
         """
-        return surprise.direct(
+        components = expected[0].shape[1]
+        spread, claimed, said = np.empty((components, components)), np.empty(components), np.empty(3)
+        hear_out.direct(
+            covariance,
+            *expected,
             self._filter.log_belief,
             self._cautions,
-            _mean(noise) + self._floor,
-            np.ascontiguousarray(residual, np.float64),
-            np.ascontiguousarray(spread, np.float64),
+            self._floor,
+            repeats,
+            member,
+            spread,
+            claimed,
+            said,
         )
-
-    def information(self, nats: float, noise: Matrix) -> float:
-        """Return what is left of ``nats`` of evidence when the measurement itself claims a noise; not below zero.
-
-        A liar's measurement lies anywhere. That an honest one lies at all near the prediction is the less surprising,
-        by the logarithm of the standard deviation in each dimension, the wider it says that it may lie.
-        """
-        variances: list[float] = noise.tolist()
-        return max(0.0, nats - 0.5 * sum(math.log1p(variance / self._floor) for variance in variances))
+        return Opinion(Testimony(expected[0][member], spread, claimed), *said.tolist())
 
     def learn(self, residual: Matrix, spread: Matrix, noise: Matrix, weight: float) -> None:
         """Learn from a residual of a source that is taken to be honest; it counts as ``weight`` measurements.

@@ -25,7 +25,6 @@ from filters.kernels.expectations import (
     expect_range,
     expect_velocity,
     expect_wheel_speed,
-    spread_of,
 )
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
@@ -138,7 +137,11 @@ class GaussianBank:
         """Have every member hold this Gaussian from now on; see :meth:`set`."""
         self._set(slice(None), mean, covariance)
 
-    def _set(self, members: slice, mean: ArrayLike, covariance: ArrayLike) -> None:
+    def set_some(self, members: list[int], mean: ArrayLike, covariance: ArrayLike) -> None:
+        """Have some members hold this Gaussian from now on; see :meth:`set`."""
+        self._set(members, mean, covariance)
+
+    def _set(self, members: slice | list[int], mean: ArrayLike, covariance: ArrayLike) -> None:
         belief = checked_gaussian("bank", mean, covariance)
         if belief.mean.shape != (len(self.names),):
             raise ValueError(f"bank: a mean of {', '.join(self.names)} is needed, got {belief.mean.shape}")
@@ -207,13 +210,6 @@ class GaussianBank:
         if said is None:
             raise ValueError(f"bank: residuals must be finite, got a measurement of {measurement}")
         return said
-
-    def spread(self, expectations: Expectations, member: int) -> Matrix:
-        """Return the covariance of what a member expects, (m, m): H C Hᵀ."""
-        components = expectations.residual.shape[1]
-        spread = np.empty((components, components))
-        spread_of.direct(self.covariance, expectations.jacobian, member, spread)
-        return spread
 
     def correct(self, expectations: Expectations, chosen: Flags, gate: float | None = None) -> Corrections:
         """Weigh a measurement into the chosen members, each by its own expectation of it.

@@ -19,13 +19,13 @@ bounded on both sides.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from filters.kalman import Matrix
+from filters.kernels import noise_shares as kernels
 from filters.linearised.bank import Expectations, GaussianBank
 from filters.linearised.interacting import mix
 from filters.motion.learned import SlowState
@@ -68,12 +68,8 @@ class SensorShare:
             self._expected = float(np.exp(self.log_belief) @ SENSOR_SHARES)
         return self._expected
 
-    def learn(self, logs: Matrix, weight: float) -> None:
-        """Take the log evidence of every share, as ``weight`` measurements, and forget as much of what was known."""
-        belief = np.exp(
-            self.log_belief + weight * logs - np.logaddexp.reduce(self.log_belief + weight * logs)
-        )
-        self.log_belief = np.log(belief @ _back(SENSOR_PRIOR, weight * FORGETTING))
+    def learned(self) -> None:
+        """Note that the belief has become another one."""
         self._expected = None
 
 
@@ -97,7 +93,9 @@ class NoiseShares:
         )
         self._of_turn = np.repeat(TURN_SHARES, DISTANCE_SHARES.size)
         self._of_distance = np.tile(DISTANCE_SHARES, TURN_SHARES.size)
+        self._of_both = np.column_stack((self._of_turn, self._of_distance))
         self.bank = GaussianBank(motion, slow, self._prior.size)
+        self._table: Matrix = np.empty((self._prior.size, SENSOR_SHARES.size))
 
     @property
     def belief(self) -> Matrix:
@@ -121,9 +119,7 @@ class NoiseShares:
         """Move every Gaussian with its own share; what the control itself leaves open is shared by all."""
         if not self.live:
             return
-        along, about = self._motion.noise_variances(
-            control._replace(distance_sigma=0.0, turn_sigma=0.0), duration
-        )
+        along, about = self._motion.noise_variances(UnicycleControl(control.distance, control.turn), duration)
         self.bank.predict(control, duration, (self._of_distance - 1.0) * along, (self._of_turn - 1.0) * about)
 
     def hear(
@@ -151,20 +147,21 @@ class NoiseShares:
         expected = self.bank.expect(sensor, value)
         if own is None:
             logs = self.bank.correct(expected, self.bank.live, GATE).log_evidence
-            self._weigh(_not_beyond_one(np.logaddexp(logs, log_outlier)), weight)
+            kernels.learn_wandering.direct(logs, log_outlier, weight, DISTANCE_SHARES.size, self._log_belief)
             return
-        table = np.logaddexp(log_densities(expected, self.bank.covariance), log_outlier)
-        self._weigh(np.logaddexp.reduce(table + own.log_belief, axis=1), weight)
-        scaled = expected._replace(noise=own.expected * expected.noise)
-        if own_weight > 0.0:
-            own.learn(np.logaddexp.reduce(table + self._log_belief[:, None], axis=0), own_weight)
+        scaled = Expectations(expected.residual, expected.jacobian, own.expected * expected.noise)
+        kernels.log_densities.direct(self.bank.covariance, *expected, SENSOR_SHARES, log_outlier, self._table)
+        if kernels.learn.direct(
+            self._table,
+            weight,
+            self._log_belief,
+            own.log_belief,
+            own_weight,
+            SENSOR_PRIOR,
+            own_weight * FORGETTING,
+        ):
+            own.learned()
         self.bank.correct(scaled, self.bank.live, GATE)
-
-    def _weigh(self, logs: Matrix, weight: float) -> None:
-        if not np.isfinite(logs).all():
-            return
-        belief = self._log_belief + weight * logs
-        self._log_belief = belief - np.logaddexp.reduce(belief)
 
     def pass_second(self) -> None:
         """Forget a second's worth, and mix the Gaussians."""
@@ -175,41 +172,14 @@ class NoiseShares:
 
     def reckon(self) -> tuple[float, float]:
         """Return the mean shares of the stated variances of turn and distance."""
-        belief = np.exp(self._log_belief)
-        return float(belief @ self._of_turn), float(belief @ self._of_distance)
+        turn, distance = (np.exp(self._log_belief) @ self._of_both).tolist()
+        return turn, distance
 
     def mean(self) -> Matrix:
         """Return the mean of the mixture over the pose's north and east, (2,)."""
         return np.exp(self._log_belief) @ self.bank.mean[:, :2]
 
 
-def _not_beyond_one(logs: Matrix) -> Matrix:
-    """Return evidence by which no share above one is more likely than one itself.
-
-    An error that wanders looks like a vehicle that does.
-    """
-    table = logs.reshape(TURN_SHARES.size, DISTANCE_SHARES.size).copy()
-    table[0] = np.minimum(table[0], table[1])
-    table[:, 0] = np.minimum(table[:, 0], table[:, 1])
-    return table.ravel()
-
-
 def _back(prior: Matrix, share: float) -> Matrix:
     """Return the transition by which a belief goes back to the prior one by a share."""
     return (1.0 - share) * np.eye(prior.size) + share * prior
-
-
-def log_densities(expected: Expectations, covariance: Matrix) -> Matrix:
-    """Return the log density of a residual under every member (rows) and share of the sensor's variance (columns)."""
-    residual, jacobian, noise = expected
-    spread = np.einsum("bmi,bij,bnj->bmn", jacobian, covariance, jacobian)[:, None]
-    if residual.shape[1] == 1:
-        total = spread[..., 0, 0] + SENSOR_SHARES * noise
-        return -0.5 * (residual * residual / total + np.log(2.0 * math.pi * total))
-    first = spread[..., 0, 0] + SENSOR_SHARES * noise[:, :1]
-    second = spread[..., 1, 1] + SENSOR_SHARES * noise[:, 1:]
-    across = spread[..., 0, 1]
-    determinant = first * second - across * across
-    one, two = residual[:, :1], residual[:, 1:]
-    square = (second * one * one - 2.0 * across * one * two + first * two * two) / determinant
-    return -0.5 * (square + np.log(determinant)) - math.log(2.0 * math.pi)

@@ -94,7 +94,7 @@ class Caution:
     def started(self, time: int) -> None:
         """Have the Gaussians wait for the belief to be one; the vehicle and its sensors are the same."""
         self._shares.stop()
-        self._checked = time - SECOND
+        self._checked = time - SECOND // 2  # others look at the belief on the whole second
 
     def moved(self, start: int, end: int) -> None:
         """Move the Gaussians, unless the vehicle stands, and see once a second whether they still are of the belief."""

@@ -84,7 +84,7 @@ class GroundVehicle:
         self.slow_states: list[SlowState] = sensor_states(configuration)
         self._height = height_of(configuration)
         self._gait: Gait | None = None
-        self._rolled = (-1, -1, -1, UnicycleControl(0.0, 0.0))
+        self._rolled = (-1, -1, -1, UnicycleControl(0.0, 0.0), 0.0)
 
     @property
     def stands(self) -> bool:
@@ -114,7 +114,7 @@ class GroundVehicle:
     def control(self, start: int, end: int) -> UnicycleControl:
         """Return what odometer and gyro say of ``start`` to ``end``, doubted as far as the wheels slip."""
         rolled = self.rolled(start, end)
-        doubt = self.controls.doubt(start, end)
+        doubt = self._rolled[4]
         if self._gait is not None:
             doubt += self._gait.doubt(rolled.distance, (end - start) / SECOND)
         return (
@@ -137,7 +137,7 @@ class GroundVehicle:
             UNKNOWN_SPEED * math.sqrt(2.0 * PERSISTENCE * max(0.0, distance.unknown)),
             UNKNOWN_YAW_RATE * math.sqrt(2.0 * PERSISTENCE * max(0.0, turn.unknown)),
         )
-        self._rolled = (start, end, heard, control)
+        self._rolled = (start, end, heard, control, self.controls.doubt(start, end))
         return control
 
     def displacement(self, start: int, end: int, biases: tuple[float, float]) -> Displacement:

@@ -17,7 +17,7 @@ from collections import deque
 
 from drivers.sample import SECOND
 from filters.binary import BinaryBayesFilter
-from service.estimator.witnesses import Testimony
+from filters.error_level import Testimony
 
 BASE = 2 * SECOND
 """Over which the rate of the position's innovation is taken, nanoseconds."""

@@ -80,6 +80,9 @@ FAR = 16.0
 """Squared distance from the belief, in standard deviations, at which they begin anew as it is."""
 
 _MODES = tuple(MotionMode)
+_WHEELED = np.array((0, 0, 1))
+"""Which of the Gaussians each mode goes by."""
+
 _SLIPS, _GRIPS = float(GENERATOR[1, 2]), float(GENERATOR[2, 1])
 
 
@@ -203,7 +206,7 @@ class Mode:
         expectations = self._bank.expect(measured.model, measured.value)
         said = self._bank.correct(expectations, self._bank.live, 0.9999)
         logs = np.logaddexp(said.log_evidence, measured.log_outlier)
-        self._modes.update_log(np.array([logs[0], logs[0], logs[1]]))
+        self._modes.update_log(logs[_WHEELED])
 
     def _check(self) -> None:
         """Begin anew as the belief where the Gaussians are not live or have lost it."""

@@ -25,9 +25,8 @@ import numpy as np
 from drivers.sample import Sample
 from filters.belief import Evidence
 from filters.binary import BinaryBayesFilter
-from filters.error_level import ErrorLevel
+from filters.error_level import ErrorLevel, Opinion, Testimony
 from filters.kalman import Matrix
-from filters.kernels.error_level import normalised
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.particle import ParticleFilter
@@ -39,7 +38,7 @@ from service.estimator.lie import Lie
 from service.estimator.measuring import Measurement
 from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
-from service.estimator.witnesses import SPAN, WILD, Testimony, Witnesses, gaussian_of
+from service.estimator.witnesses import SPAN, WILD, Witnesses, gaussian_of
 
 MOST_GROUPS, MOST_SENSORS = 16, 32
 """Groups and sensors beyond so many are not judged."""
@@ -145,10 +144,9 @@ class Judged:
         while self.lessons and now - self.lessons[0][0] > HINDSIGHT:
             self.level.learn(*self.lessons.popleft()[1], 1.0 / LEARNING)
 
-    def compare(self, testimony: Testimony, weight: float) -> None:
+    def compare(self, opinion: Opinion, weight: float) -> None:
         """Note whether a reading is wild for its witness."""
-        nis = normalised.direct(*testimony)
-        self.strange += weight / STRANGE * ((nis > WILD) - self.strange)
+        self.strange += weight / STRANGE * ((opinion.nis > WILD) - self.strange)
 
     def weight(self, time: int) -> float:
         """Return how much of a second has passed since the reading before, at most one, and note this one."""
@@ -243,7 +241,7 @@ class Trust:
         self._groups: dict[str, Group] = {}
         self._by_name: dict[str, Group] = {}
         self._sensors = 0
-        self._time = self._since = 0
+        self._time = self._since = self._due = 0
 
     def log_odds(self, name: str) -> float | None:
         """Return the log odds of the sensor ``name``; ``None`` while it is not judged."""
@@ -255,7 +253,7 @@ class Trust:
 
     def started(self, time: int) -> None:
         """Dismiss the witnesses: they are of another belief."""
-        self._time = self._since = time
+        self._time = self._since = self._due = time
         self._witnesses.clear()
 
     @property
@@ -301,15 +299,21 @@ class Trust:
         """Move the witnesses, and have new ones begin when it is time."""
         self._time = end
         self._witnesses.move(self._control(start, end), (end - start) / SECOND)
-        latest = end - min(SPAN // 2, max(YOUNGEST, (end - self._since) // 2))
-        due = [
-            group
-            for group in self._groups.values()
-            if ((began := self._witnesses.newest(group.place)) is None or began <= latest)
-            and not group.flagged
-        ]
-        if due and self._all_calm():
+        if end < self._due:
+            return
+        following = [(self._following(group), group) for group in self._groups.values() if not group.flagged]
+        due = [group for time, group in following if time <= end]
+        if not due:
+            self._due = min((time for time, _ in following), default=end + YOUNGEST)
+        elif self._all_calm():
             self._begin(due)
+
+    def _following(self, group: Group) -> int:
+        """Return when the group's next witness is to begin, nanoseconds."""
+        began = self._witnesses.newest(group.place)
+        if began is None:
+            return self._time
+        return min(began + SPAN // 2, max(began + YOUNGEST, 2 * began - self._since))
 
     def _all_calm(self) -> bool:
         """Say whether nobody of those who are trusted is under suspicion."""
@@ -334,14 +338,14 @@ class Trust:
             return True
         sensor = group.sensors[measured.name]
         weight = sensor.weight(time)
-        said = self._witnesses.testify(group.place, measured)
+        said = self._witnesses.testify(group.place, measured, sensor.level)
         if not said:
             self._begin([group])
         else:
-            testimony = _gravest(group, sensor, said)
-            sensor.compare(testimony, weight)
-            self._judge(group, sensor, testimony, next(iter(said.values())), weight)
-            group.lie.hear(time, testimony, weight, sensor.absolute)
+            opinion = _gravest(group, said)
+            sensor.compare(opinion, weight)
+            self._judge(group, sensor, opinion, next(iter(said.values())).testimony, weight)
+            group.lie.hear(time, opinion.testimony, weight, sensor.absolute)
         if group.flagged and not sensor.absolute:
             return not sensor.flagged and group.lie.leaves_alone
         return not sensor.flagged
@@ -369,6 +373,7 @@ class Trust:
             return None
         if group is None:
             group = self._groups[name] = Group(len(self._groups))
+            self._due = self._time
         if measured.name not in group.sensors:
             if self._sensors >= MOST_SENSORS:
                 return None
@@ -381,15 +386,14 @@ class Trust:
         return group
 
     def _judge(
-        self, group: Group, sensor: Judged, testimony: Testimony, eldest: Testimony, weight: float
+        self, group: Group, sensor: Judged, opinion: Opinion, eldest: Testimony, weight: float
     ) -> None:
         doubt = DOUBT_OF_A_LIAR if sensor.flagged else DOUBT
-        surprise = sensor.level.surprise(*testimony)
-        verdict = sensor.level.information(doubt, testimony.noise) - surprise
+        verdict = opinion.information(doubt) - opinion.surprise
         if not sensor.absolute:
-            group.note(surprise, weight)
+            group.note(opinion.surprise, weight)
         elif not sensor.flagged:
-            together = sensor.level.information(TOGETHER, testimony.noise) - surprise
+            together = opinion.information(TOGETHER) - opinion.surprise
             verdict = min(verdict, together - group.support(sensor.heard or 0))
         sensor.remember(eldest, verdict > 0.0 and not sensor.flagged)
         if verdict < 0.0 and not (sensor.agreed and self._accuses(group)):
@@ -399,8 +403,10 @@ class Trust:
         sensor.agreed |= odds >= CALM
         if sensor.flagged:
             sensor.flagged = odds < EARNED
+            self._due = self._time
         elif odds <= FLAGGED:
             sensor.flagged = True
+            self._due = self._time
             sensor.lessons.clear()
             group.lie.begin()
             if sensor.absolute:
@@ -442,11 +448,10 @@ class Trust:
         if float(moments.variance[2]) > NARROW**2 or float(moments.variance[:2].sum()) > 2.0 * PLACED**2:
             return
         gaussian = gaussian_of(self._belief, self._motion.conditional_variances)
-        for group in groups:
-            self._witnesses.begin(group.place, self._time, *gaussian)
+        self._witnesses.begin([group.place for group in groups], self._time, *gaussian)
 
 
-def _gravest(group: Group, sensor: Judged, said: dict[int, Testimony]) -> Testimony:
+def _gravest(group: Group, said: dict[int, Opinion]) -> Opinion:
     """Return what the witness says who is surprised most; once the group is caught, what that one goes on to say.
 
     The younger one knows better where the vehicle is; the older one has the less to do with the group, and goes first
@@ -455,10 +460,9 @@ def _gravest(group: Group, sensor: Judged, said: dict[int, Testimony]) -> Testim
     """
     if group.flagged and group.accuser in said:
         return said[group.accuser]
-    surprises = {member: sensor.level.surprise(*testimony) for member, testimony in said.items()}
     group.accuser = eldest = next(iter(said))
-    if surprises[eldest] < sensor.level.information(DOUBT, said[eldest].noise):
-        group.accuser = max(surprises, key=surprises.__getitem__)
+    if said[eldest].surprise < said[eldest].information(DOUBT):
+        group.accuser = max(said, key=lambda member: said[member].surprise)
     return said[group.accuser]
 
 

@@ -12,14 +12,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from filters.error_level import ErrorLevel, Opinion
 from filters.kalman import Matrix
 from filters.kernels.expectations import note
-from filters.linearised.bank import BATCHED, GaussianBank
+from filters.linearised.bank import BATCHED, Expectations, GaussianBank
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle
 from filters.particle import ParticleFilter
@@ -44,27 +45,9 @@ MEMORY = 20.0
 
 SLOTS = 2
 SAMPLE = 2048
-"""The belief's covariance is taken over about so many particles."""
+"""The belief's covariance is taken over so many particles at most."""
 
 _HEADING = 2
-
-
-class Testimony(NamedTuple):
-    """What a witness says of a measurement of the group that it does not listen to.
-
-    Attributes
-    ----------
-    residual : (n,) float64
-        Measured minus what it expected.
-    spread : (n, n) float64
-        Covariance of what it expected.
-    noise : (n,) float64
-        Variances of the measurement, of one that repeats no other's errors.
-    """
-
-    residual: Matrix
-    spread: Matrix
-    noise: Matrix
 
 
 class Witnesses:
@@ -85,6 +68,7 @@ class Witnesses:
         self._began = [0] * (SLOTS * groups)
         self._contradiction: Matrix = np.zeros(SLOTS * groups)
         self._wildness: Matrix = np.zeros(SLOTS * groups)
+        self._expected: tuple[Measurement, Expectations] | None = None
 
     @staticmethod
     def dismiss(live: NDArray[np.bool_], group: int) -> None:
@@ -93,22 +77,25 @@ class Witnesses:
 
     def clear(self) -> None:
         """Dismiss all of them."""
+        self._expected = None
         self.bank.live[:] = False
 
     def move(self, control: Any, duration: float) -> None:
         """Move them by a control."""
+        self._expected = None
         self.bank.predict(control, duration)
         self._contradiction *= math.exp(-duration / MEMORY)
 
     def hear(self, group: int, measured: Measurement) -> None:
         """Let all but the group's own take its measurement, and note how it contradicts them."""
-        if type(measured.model) not in BATCHED:
+        expectations = self._expect(measured)
+        if expectations is None:
             return
         chosen = self.bank.live.copy()
         chosen[SLOTS * group : SLOTS * (group + 1)] = False
         if not chosen.any():
             return
-        expectations = self.bank.expect(measured.model, measured.value)
+        self._expected = None
         nis = self.bank.correct(expectations, chosen, GATE).nis
         components = expectations.residual.shape[1]
         note.direct(
@@ -123,6 +110,16 @@ class Witnesses:
             self._wildness,
         )
 
+    def _expect(self, measured: Measurement) -> Expectations | None:
+        """Return what all expect; a measurement that is judged is heard next, if it is believed."""
+        if self._expected is not None and self._expected[0] is measured:
+            return self._expected[1]
+        if type(measured.model) not in BATCHED:
+            return None
+        expectations = self.bank.expect(measured.model, measured.value)
+        self._expected = measured, expectations
+        return expectations
+
     def judging(self, group: int) -> int | None:
         """Return the member that judges the group: the older one; ``None`` if there is none."""
         return min(self._members(group), key=self._began.__getitem__, default=None)
@@ -133,9 +130,8 @@ class Witnesses:
 
     def _members(self, group: int) -> list[int]:
         """Return the group's witnesses that are live."""
-        first = SLOTS * group
-        live: list[bool] = self.bank.live[first : first + SLOTS].tolist()
-        return [first + slot for slot, one in enumerate(live) if one]
+        live = self.bank.live
+        return [member for member in self._slots(group) if live[member]]
 
     def contradiction(self, group: int) -> float:
         """Return how far the others contradict the group's witness, nats over the last seconds: 0 is normal."""
@@ -147,27 +143,34 @@ class Witnesses:
         member = self.judging(group)
         return 0.0 if member is None else float(self._wildness[member])
 
-    def testify(self, group: int, measured: Measurement) -> dict[int, Testimony]:
-        """Say what each of the group's witnesses makes of a measurement of it, by member, the older one first."""
-        members = sorted(self._members(group), key=self._began.__getitem__)
-        if not members or type(measured.model) not in BATCHED:
-            return {}
-        said = self.bank.expect(measured.model, measured.value)
-        testimonies: dict[int, Testimony] = {}
-        for member in members:
-            testimonies[member] = Testimony(
-                said.residual[member], self.bank.spread(said, member), said.noise[member] / measured.repeats
-            )
-        return testimonies
+    def testify(self, group: int, measured: Measurement, level: ErrorLevel) -> dict[int, Opinion]:
+        """Say what each of the group's witnesses makes of a measurement of it, by member, the older one first.
 
-    def begin(self, group: int, time: int, mean: Matrix, covariance: Matrix) -> None:
-        """Have a witness of the group begin at ``time`` with this Gaussian, in the place of the older one."""
-        members = range(SLOTS * group, SLOTS * (group + 1))
-        member = min(members, key=lambda m: self._began[m] if self.bank.live[m] else -(2**62))
-        self.bank.set(member, mean, covariance)
-        self._began[member] = time
-        self._contradiction[member] = 0.0
-        self._wildness[member] = 0.0
+        ``level`` is what errors are normal for the sensor.
+        """
+        members = sorted(self._members(group), key=self._began.__getitem__)
+        expectations = self._expect(measured) if members else None
+        if expectations is None:
+            return {}
+        covariance, repeats = self.bank.covariance, measured.repeats
+        return {member: level.hear_out(expectations, covariance, member, repeats) for member in members}
+
+    def begin(self, groups: Sequence[int], time: int, mean: Matrix, covariance: Matrix) -> None:
+        """Have a witness of each group begin at ``time`` with this Gaussian, in the place of the older one."""
+        self._expected = None
+        members = [min(self._slots(group), key=self._beginning_of) for group in groups]
+        self.bank.set_some(members, mean, covariance)
+        self._contradiction[members] = self._wildness[members] = 0.0
+        for member in members:
+            self._began[member] = time
+
+    @staticmethod
+    def _slots(group: int) -> range:
+        return range(SLOTS * group, SLOTS * (group + 1))
+
+    def _beginning_of(self, member: int) -> int:
+        """Return when a witness began; of a free place, before any."""
+        return self._began[member] if self.bank.live[member] else -(2**62)
 
     def gaussian(self, member: int) -> tuple[Matrix, Matrix]:
         """Return mean and covariance of a witness."""
@@ -184,7 +187,7 @@ def gaussian_of(belief: ParticleFilter[Any], given_path: dict[str, float]) -> tu
     given_path : dict[str, float]
         Variances of the marginalised dimensions beside the spread of the particles' own values.
     """
-    step = max(1, belief.count // SAMPLE)
+    step = -(-belief.count // SAMPLE)
     weights = belief.weights[::step].astype(np.float64)
     weights /= weights.sum()
     size = sum(not name.startswith(RECEIVER_BIAS) for name in belief.names)

@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from filters.error_level import CAUTIONS, LEVELS, ErrorLevel
+from filters.error_level import CAUTIONS, LEVELS, ErrorLevel, Opinion
 
 SPREAD = np.array([[9.0, 2.0], [2.0, 4.0]])
 NOISE = np.array([0.5, 0.5])
+
+
+def _opinion(level: ErrorLevel, residual: np.ndarray, spread: np.ndarray, noise: np.ndarray) -> Opinion:
+    """Return what a Gaussian of that spread makes of a residual, as the second of two, which are measured directly."""
+    size = residual.size
+    expected = np.stack([0 * residual, residual]), np.stack([np.eye(size)] * 2), np.stack([noise, noise])
+    return level.hear_out(expected, np.stack([np.eye(size), spread]), 1, 2.0)
 
 
 def _densities(residual: np.ndarray, usual: float, floor: bool) -> np.ndarray:
@@ -34,8 +41,15 @@ def test_surprise_is_the_ratio_of_two_mixtures(residual: np.ndarray) -> None:
     size = residual.size
     level = ErrorLevel(2.0)
     expected = math.log(_densities(np.zeros(size), 2.0, True).mean() / _densities(residual, 2.0, True).mean())
-    found = level.surprise(residual, SPREAD[:size, :size], NOISE[:size])
-    assert found == pytest.approx(expected, rel=1e-12)
+    spread, noise = np.ascontiguousarray(SPREAD[:size, :size]), NOISE[:size]
+    found = _opinion(level, residual, spread, 2.0 * noise)
+    assert found.surprise == pytest.approx(expected, rel=1e-12)
+    assert found.nis == pytest.approx(
+        residual @ np.linalg.solve(spread + np.diag(noise), residual), rel=1e-12
+    )
+    np.testing.assert_array_equal(found.testimony.residual, residual)
+    np.testing.assert_allclose(found.testimony.spread, spread, rtol=1e-12)
+    np.testing.assert_array_equal(found.testimony.noise, noise)
 
 
 def test_learns_by_bayes_rule_tempered_by_the_weight() -> None:
@@ -64,15 +78,17 @@ def test_a_source_that_was_quiet_is_still_granted_the_usual_level() -> None:
     level = ErrorLevel(5.0)
     for _ in range(500):
         level.learn(np.zeros(2), 0.01 * np.eye(2), NOISE, 1.0)
-    assert level.surprise(np.array([10.0, 0.0]), 0.01 * np.eye(2), NOISE) < 2.1
-    assert level.surprise(np.array([25.0, 0.0]), 0.01 * np.eye(2), NOISE) > 12.0
+    assert _opinion(level, np.array([10.0, 0.0]), 0.01 * np.eye(2), 2.0 * NOISE).surprise < 2.1
+    assert _opinion(level, np.array([25.0, 0.0]), 0.01 * np.eye(2), 2.0 * NOISE).surprise > 12.0
 
 
 def test_a_claimed_noise_leaves_less_evidence() -> None:
-    level = ErrorLevel(5.0)
-    assert level.information(8.0, np.zeros(2)) == 8.0
-    assert level.information(8.0, np.full(2, 75.0)) == pytest.approx(8.0 - math.log(4.0))
-    assert level.information(8.0, np.full(2, 1e9)) == 0.0
+    def left(noise: float) -> float:
+        return _opinion(ErrorLevel(5.0), np.ones(2), np.eye(2), np.full(2, 2.0 * noise)).information(8.0)
+
+    assert left(0.0) == 8.0
+    assert left(75.0) == pytest.approx(8.0 - math.log(4.0))
+    assert left(1e9) == 0.0
 
 
 def test_refuses_what_makes_no_sense() -> None:

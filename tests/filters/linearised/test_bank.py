@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from filters.extended_kalman import ExtendedKalmanFilter
+from filters.kernels.expectations import spread_of
 from filters.linearised import LinearisedUnicycle
 from filters.linearised.bank import GaussianBank
 from filters.linearised.shadow import LINEARISED
@@ -143,12 +144,16 @@ def test_the_spread_of_what_is_expected_is_that_of_the_covariance_and_all_can_be
     said = bank.expect(Position(1.0, lever=(0.4, -0.2)), PositionMeasurement(1.0, 2.0))
     for member in range(3):
         jacobian = said.jacobian[member]
-        expected = jacobian @ bank.covariance[member] @ jacobian.T
-        np.testing.assert_allclose(bank.spread(said, member), expected, rtol=1e-12)
+        spread = np.empty((2, 2))
+        spread_of(bank.covariance, said.jacobian, member, spread)
+        np.testing.assert_allclose(spread, jacobian @ bank.covariance[member] @ jacobian.T, rtol=1e-12)
     mean, covariance = _gaussian(np.random.default_rng(9))
     bank.live[1] = False
     bank.set_all(mean, covariance)
     assert bank.live.all()
+    bank.live[:] = False
+    bank.set_some([0, 2], mean, covariance)
+    assert bank.live.tolist() == [True, False, True]
     np.testing.assert_array_equal(bank.mean[0], bank.mean[2])
     np.testing.assert_allclose(bank.covariance[1], covariance, rtol=1e-12)
 

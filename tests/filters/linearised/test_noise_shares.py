@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from filters.kernels.noise_shares import learn, learn_wandering, log_densities
 from filters.linearised.bank import GaussianBank
-from filters.linearised.noise_shares import SENSOR_SHARES, NoiseShares, SensorShare, log_densities
+from filters.linearised.noise_shares import SENSOR_SHARES, NoiseShares, SensorShare
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.sensing import Position, PositionMeasurement, Range, RangeMeasurement
 
@@ -111,6 +112,31 @@ def test_errors_that_wander_do_not_pass_for_a_vehicle_that_does() -> None:
     assert learned(None) < 5.0
 
 
+def test_motion_and_sensor_learn_of_each_other_by_bayes_rule() -> None:
+    """Both marginals of one table, the second by what the first has become."""
+    chance = np.random.default_rng(1)
+    table, motion, sensor = chance.normal(size=(4, 3)), np.log(np.full(4, 0.25)), np.log([0.5, 0.3, 0.2])
+    prior, weight, own_weight, forgotten = np.array([0.2, 0.6, 0.2]), 0.5, 0.3, 0.01
+    expected = np.exp(motion) * (np.exp(table) @ np.exp(sensor)) ** weight
+    expected /= expected.sum()
+    own = np.exp(sensor) * (expected @ np.exp(table)) ** own_weight
+    own = (1.0 - forgotten) * own / own.sum() + forgotten * prior
+    assert learn(table, weight, motion, sensor, own_weight, prior, forgotten)
+    np.testing.assert_allclose(np.exp(motion), expected, rtol=1e-12)
+    np.testing.assert_allclose(np.exp(sensor), own, rtol=1e-12)
+    table[1, :] = -math.inf  # impossible under one of them: of no use to anyone
+    assert not learn(table, weight, motion, sensor, own_weight, prior, forgotten)
+    np.testing.assert_allclose(np.exp(motion), expected, rtol=1e-12)
+
+
+def test_who_wanders_never_makes_more_noise_likelier_than_what_is_stated() -> None:
+    logs, motion = np.array([3.0, 5.0, 2.0, 1.0, -1.0, 4.0]), np.log(np.full(6, 1 / 6))
+    learn_wandering(logs, -math.inf, 1.0, 3, motion)
+    bounded = np.array([1.0, -1.0, 2.0, -1.0, -1.0, 4.0])
+    bounded[0] = min(bounded[0], bounded[1])
+    np.testing.assert_allclose(np.exp(motion), np.exp(bounded) / np.exp(bounded).sum(), rtol=1e-12)
+
+
 @pytest.mark.parametrize("measured", [1, 2])
 def test_densities_of_every_share_are_those_of_the_bank(measured: int) -> None:
     """The kernel weighs one component after the other, these at once: two ways to the same number."""
@@ -126,7 +152,8 @@ def test_densities_of_every_share_are_those_of_the_bank(measured: int) -> None:
         else PositionMeasurement(0.5, 1.0, 0.5, 0.8)
     )
     expected = bank.expect(sensor, value)
-    table = log_densities(expected, bank.covariance)
+    table = np.empty((3, SENSOR_SHARES.size))
+    log_densities(bank.covariance, *expected, SENSOR_SHARES, -math.inf, table)
     for column, share in enumerate(SENSOR_SHARES):
         scaled = expected._replace(noise=share * expected.noise)
         said = bank.correct(scaled, bank.live, 0.0)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from drivers.sample import SECOND
+from filters import error_level
 from filters.kalman import Matrix
 from service.estimator import witnesses
 from service.estimator.lie import Lie
@@ -193,9 +194,11 @@ def test_a_young_belief_has_its_witnesses_begin_anew_soon_and_then_ever_later(
     began: list[float] = []
     begin = witnesses.Witnesses.begin
 
-    def noted(self: witnesses.Witnesses, group: int, time: int, mean: Matrix, covariance: Matrix) -> None:
+    def noted(
+        self: witnesses.Witnesses, groups: list[int], time: int, mean: Matrix, covariance: Matrix
+    ) -> None:
         began.append(time / SECOND)
-        begin(self, group, time, mean, covariance)
+        begin(self, groups, time, mean, covariance)
 
     monkeypatch.setattr(witnesses.Witnesses, "begin", noted)
     judged(Drive(seed=12), 230.0, lambda drive: [drive.position()])
@@ -232,6 +235,6 @@ def test_a_velocity_is_left_alone_only_if_it_does_not_go_with_the_lie(
         time = round(k * STEP * SECOND)
         position = np.array([rate * k * STEP, 0.0]) + 0.4 * chance.standard_normal(2)
         heard = np.array([velocity, 0.0]) + 0.1 * chance.standard_normal(2)
-        lie.hear(time, witnesses.Testimony(position, np.eye(2), np.full(2, 0.16)), STEP, True)
-        lie.hear(time, witnesses.Testimony(heard, 0.02 * np.eye(2), np.full(2, 0.01)), STEP, False)
+        lie.hear(time, error_level.Testimony(position, np.eye(2), np.full(2, 0.16)), STEP, True)
+        lie.hear(time, error_level.Testimony(heard, 0.02 * np.eye(2), np.full(2, 0.01)), STEP, False)
     assert lie.leaves_alone is alone
