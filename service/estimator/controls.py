@@ -149,6 +149,8 @@ class Controls:
         self._difference: tuple[int, float, object] | None = None
         self._distance: Track = Track()
         self._turn: Track = Track()
+        self._push = RateTrack()
+        self._pusher = Choice()
         self._speaker = Choice()
         self._gyro = Choice()
 
@@ -157,6 +159,12 @@ class Controls:
         """Who speaks for the distance and for the turn, as the wire names them."""
         distance, turn = self._speaker.source, self._gyro.source
         return (distance.name if distance else None, turn.name if turn else None)
+
+    @property
+    def feels_turns(self) -> bool:
+        """Whether the turn is what an inertial sensor felt, not what wheels did or were told to do."""
+        source = self._gyro.source
+        return source is not None and source.rank < WHEELS_RANK
 
     @property
     def earliest(self) -> int | None:
@@ -172,6 +180,8 @@ class Controls:
             if reading.angular_velocity is not None:
                 rank = YAW_RATE_RANKS.get(sample.source, len(YAW_RATE_RANKS))
                 self._take_gyro(sample, reading.angular_velocity[2], rank)
+            if reading.specific_force is not None:
+                self._take_push(sample, reading.specific_force[0])
             return True
         if isinstance(reading, Rotation):
             self._take_gyro(sample, reading.yaw_rate, -1)
@@ -308,6 +318,23 @@ class Controls:
             self._turn = RateTrack()
         self.out_of_order += not self._turn.append(time, rate)
 
+    def _take_push(self, sample: Sample, force: float) -> None:
+        """Feed the specific force along the vehicle: what it is pushed with, and of gravity what a slope adds."""
+        rank = YAW_RATE_RANKS.get(sample.source, len(YAW_RATE_RANKS))
+        if abs(force) <= FASTEST and self._pusher.accepts(
+            Source(rank, sample.link, sample.source), sample.time
+        ):
+            self._push.append(sample.time, force)
+
+    @property
+    def counted(self) -> bool:
+        """Whether the distance is what wheels have counted."""
+        return isinstance(self._distance, TotalTrack)
+
+    def gained(self, start: int, end: int) -> Motion:
+        """Return by how much an accelerometer says that the speed has changed between two times, m/s."""
+        return self._push.between(start, end)
+
     def distance(self, start: int, end: int) -> Motion:
         """Return metres rolled between two times, and the seconds of them without knowledge."""
         return self._distance.between(start, end)
@@ -345,6 +372,7 @@ class Controls:
         self._distance.forget(before)
         self._doubt.forget(before)
         self._turn.forget(before)
+        self._push.forget(before)
 
 
 def controls_of(settings: MotionSettings, sensors: Sequence[Sensor] = ()) -> Controls:

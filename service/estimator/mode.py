@@ -1,9 +1,11 @@
 """The motion mode: still, moving or slipping.
 
 A discrete Bayes filter (Table 4.1) over the three, with rates at which one turns into another. Every stretch of the
-odometry and of the gyro is evidence between still and moving. Between moving and slipping nothing on board can tell
-but what is measured from outside: two Gaussians that interact (:mod:`filters.linearised.interacting`), one taking the
-wheels at their word and one doubting them by :data:`SLIP`, say of each measurement how well they expected it.
+odometry and of the gyro is evidence between still and moving. That wheels begin or cease to slip shows in a jump of
+their speed that no accelerometer felt (:class:`~service.estimator.grip.Grip`): evidence of a change, not of a mode.
+How far they slip only shows in what is measured from outside: two Gaussians that interact
+(:mod:`filters.linearised.interacting`), one taking the wheels at their word and one doubting them by :data:`SLIP`, say
+of each measurement how well they expected it.
 
 What follows from it: a vehicle that certainly stands is neither moved nor resampled, and its gyro's reading is its
 bias; the wheels of one that slips are doubted, so that neither the pose nor the odometry's scale is led away.
@@ -28,6 +30,7 @@ from filters.particle import ParticleFilter
 from filters.transition import Drift
 from service.config import Configuration
 from service.estimate import MotionMode
+from service.estimator.grip import NOTHING, Grip, Said
 from service.estimator.ground import GroundVehicle
 from service.estimator.measuring import Measurement
 from service.estimator.vehicle import Vehicle
@@ -41,6 +44,10 @@ BEGINNING = (0.5, 0.45, 0.05)
 
 SLIP = 0.2
 """How far wheels that slip are off, as a share of the speed (one standard deviation)."""
+
+JUMPY, SUDDEN = 0.005, 0.5
+"""Which share of the :data:`TELLING` stretches of slipping wheels have a jump, and of the slips begin or end with one:
+ice is left gently."""
 
 GRIP = 1.0
 """Seconds for which a slip goes on in one way: it adds up faster than noise."""
@@ -99,6 +106,8 @@ class Mode:
         What the two Gaussians begin as.
     rolled : callable
         What odometer and gyro said between two times, undoubted.
+    grip : Grip, optional
+        Who compares wheels and accelerometer.
 
     Attributes
     ----------
@@ -112,10 +121,12 @@ class Mode:
         slow: list[SlowState],
         belief: ParticleFilter[Any],
         rolled: Callable[[int, int], UnicycleControl],
+        grip: Grip | None = None,
     ) -> None:
         self._motion = motion
         self._belief = belief
         self._rolled = rolled
+        self._grip = grip
         self._bank = GaussianBank(motion, slow, 2)
         self._modes = DiscreteBayesFilter[MotionMode](_MODES, np.eye(3), BEGINNING)
         self.stands = False
@@ -150,7 +161,8 @@ class Mode:
         if self._told is None:
             self._told = start
         if end - self._told >= TELLING:
-            self._tell((end - self._told) / SECOND, self._rolled(self._told, end))
+            said = NOTHING if self._grip is None else self._grip.ask(self._told, end)
+            self._tell((end - self._told) / SECOND, self._rolled(self._told, end), said)
             self._told = end
         rolls, turns = self._looks((end - start) / SECOND, self._rolled(start, end))
         self.stands = not rolls and not turns and self.still >= CERTAIN
@@ -162,12 +174,15 @@ class Mode:
             abs(control.turn - self._bias * duration) > SPIN * duration,
         )
 
-    def _tell(self, duration: float, control: UnicycleControl) -> None:
-        """Let the modes change, and weigh them by wheels and gyro."""
+    def _tell(self, duration: float, control: UnicycleControl, said: Said) -> None:
+        """Let the modes change, and weigh them by wheels and gyro, and by wheels and accelerometer."""
         stretch = min(duration, 1.0)  # the filter is told ten times a second
         if self._bank.live.all():
             mix(self._bank, _among_wheeled(stretch), self._modes.belief[1:] + 1e-12)
-        self._modes.propagate(Drift(GENERATOR, stretch))
+        if said is NOTHING:
+            self._modes.propagate(Drift(GENERATOR, stretch))
+        else:
+            self._change(stretch, said)
         rolls, turns = self._looks(duration, control)
         logs = np.zeros(3)
         if control.distance_sigma == 0.0:
@@ -177,6 +192,13 @@ class Mode:
         self._modes.update_log(min(1.0, duration / STRETCH) * logs)
         slipping = self._modes.probability(MotionMode.SLIPPING)
         self._slips = slipping >= (GRIPPING if self._slips else SLIPPERY)
+
+    def _change(self, stretch: float, said: Said) -> None:
+        """Let the modes change, p(j | i) p(z | i, j): what is measured, a jump, is a matter of both i and j."""
+        change = (np.eye(3) + stretch * GENERATOR) * _likely(said)
+        leaving = change.sum(axis=1)
+        self._modes.update_log(np.log(leaving))
+        self._modes.propagate(change / leaving[:, None])
 
     # --- a companion of the belief --------------------------------------------------------------------------------
 
@@ -226,6 +248,13 @@ class Mode:
         self._bank.set_all(mean, covariance)
 
 
+def _likely(said: Said) -> Matrix:
+    """Return the likelihood of what was said for each change of mode, from row to column; 1 where the wheels hold."""
+    changes = (1.0 - SUDDEN) * said.slip + SUDDEN * said.change
+    slips = (1.0 - JUMPY) * said.slip + JUMPY * said.change
+    return np.array(((1.0, 1.0, changes), (1.0, 1.0, changes), (changes, changes, slips)))
+
+
 def _slip_variance(distance: float, duration: float) -> float:
     """Return the variance of the distance that slipping wheels count over a stretch."""
     return 2.0 * GRIP * (SLIP * distance) ** 2 / duration
@@ -241,6 +270,7 @@ def mode_of(configuration: Configuration, vehicle: Vehicle, belief: ParticleFilt
     """Return who follows the mode of a vehicle, and have the vehicle heed it; ``None`` where it is switched off."""
     if not (configuration.honesty.motion_mode and isinstance(vehicle, GroundVehicle)):
         return None
-    mode = Mode(vehicle.motion, vehicle.slow_states, belief, vehicle.rolled)
+    grip = Grip(vehicle.controls, SLIP)
+    mode = Mode(vehicle.motion, vehicle.slow_states, belief, vehicle.rolled, grip)
     vehicle.heed(mode)
     return mode
