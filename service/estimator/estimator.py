@@ -27,6 +27,7 @@ from service.estimator.companion import Companion, Watched
 from service.estimator.course import CROWD, Cause, Course, Level
 from service.estimator.deputy import Deputy
 from service.estimator.fusion import Fusion
+from service.estimator.ground import GroundVehicle
 from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
 from service.estimator.jumps import Jumps
@@ -123,8 +124,9 @@ class Estimator:
             self._population.tracker = self._tracker
             self._fusion.companions.append(self._tracker)
         receivers = None
-        if biases:
-            receivers = Receivers(biases, self._filter, configuration.start.mode == "given")
+        if biases and isinstance(self._vehicle, GroundVehicle):
+            placed = configuration.start.mode == "given"
+            receivers = Receivers(biases, self._vehicle, self._filter, placed)
             self._fusion.receivers = self._population.receivers = receivers
             self._fusion.companions.append(receivers)
         lasting = Lasting(receivers)

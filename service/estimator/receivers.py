@@ -14,31 +14,42 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from filters.belief import Evidence
+from filters.kalman import Matrix
+from filters.linearised.bank import BATCHED
+from filters.linearised.error_parts import ErrorParts, Parts
 from filters.motion.learned import Learned
 from filters.particle import ParticleFilter
 from filters.sensing import Position, PositionMeasurement
 from filters.sensing.biased_position import Bias, BiasedPosition
 from service.config import Configuration
+from service.estimator.ground import GroundVehicle
 from service.estimator.measuring import Measurement
 from service.estimator.start import receiver_name
 from service.estimator.track import SECOND
-
-DURATION = 60.0
-"""Seconds over which reflections and atmosphere change what a receiver says."""
+from service.estimator.witnesses import gaussian_of
 
 PLACE = ("north", "east")
 
 FADING = SECOND // 4
 """Nanoseconds that are gathered before the states decay: they are slow."""
 
-FRESH = 0.2
-"""Share of a receiver's variance that does not last, while nothing better is known."""
+GATHERED = SECOND // 4
+"""Nanoseconds of driving that those who learn of an error are moved by at once, at most."""
+
+NARROW, NARROW_HEADING = 6.0, 0.35
+"""Metres and radians: the spread of a belief that Gaussians can stand for."""
+
+FAR = 16.0
+"""Squared distance from the belief, in standard deviations, at which they begin anew as it is."""
+
+PRUDENCE = 0.5
+"""What a fix teaches of the error, as a share of what it would if the models were right."""
 
 ANOTHER = 1.5
 """A claim that has changed by this factor is of other circumstances, and so is a part of the error."""
@@ -58,17 +69,33 @@ class Receiver:
         Standard deviation that it claims, metres, as of when that last changed much.
     seated : bool
         Whether the particles' values are of this beginning of the belief.
+    learner : ErrorParts
+        Who learns what the error is made of.
+    parts : Parts
+        What it is made of.
+    witnessed : dict[str, int]
+        When they heard each other sensor last, nanoseconds.
     """
 
     bias: Bias
+    learner: ErrorParts
+    parts: Parts
     model: BiasedPosition | None = None
     claim: float = 0.0
     seated: bool = False
+    witnessed: dict[str, int] = field(default_factory=dict[str, int])
 
     @property
     def variance(self) -> float:
         """Of the part that lasts, m² per axis."""
-        return (1.0 - FRESH) * self.claim**2
+        return self.parts.lasting * self.claim**2
+
+    def is_due(self, measured: Measurement, time: int) -> bool:
+        """Say whether it is time to learn from another sensor again; it never is from another receiver."""
+        if isinstance(measured.model, Position) or time - self.witnessed.get(measured.name, 0) < GATHERED:
+            return False
+        self.witnessed[measured.name] = time
+        return True
 
 
 class Receivers:
@@ -80,16 +107,28 @@ class Receivers:
         Of every receiver, by the name that its fixes have.
     belief : ParticleFilter
         Whose states they are.
+    vehicle : GroundVehicle
+        Whose odometry tells how it moves.
     placed : bool
         Whether the belief begins at a place that was told, not by a fix.
     """
 
-    def __init__(self, biases: dict[str, Bias], belief: ParticleFilter[Any], placed: bool) -> None:
-        self._receivers = {name: Receiver(bias) for name, bias in biases.items()}
+    def __init__(
+        self, biases: dict[str, Bias], vehicle: GroundVehicle, belief: ParticleFilter[Any], placed: bool
+    ) -> None:
+        motion, slow = vehicle.motion, vehicle.slow_states
+        learners = {name: ErrorParts(motion, slow) for name in biases}
+        self._receivers = {
+            name: Receiver(bias, learners[name], learners[name].parts) for name, bias in biases.items()
+        }
+        self._vehicle = vehicle
         self._belief = belief
         self._placed = placed
         self._begun = False
         self._gathered = 0
+        self._moved: tuple[int, int] | None = None
+        self._stood = False
+        self._checked = 0
 
     def knows(self, measured: Measurement) -> bool:
         """Say whether a measurement is a fix with an error that is a state."""
@@ -105,7 +144,7 @@ class Receivers:
             assert isinstance(measured.model, Position)
             receiver.model = BiasedPosition(measured.model, receiver.bias)
         self._claimed(receiver, math.sqrt(measured.lasting))
-        sigma = math.sqrt(FRESH * measured.lasting * measured.repeats)
+        sigma = math.sqrt(receiver.parts.fresh * measured.lasting * measured.repeats)
         value = value._replace(sigma_north=sigma, sigma_east=sigma)
         if not receiver.seated:
             self._seat(receiver, value)
@@ -147,22 +186,80 @@ class Receivers:
     def started(self, time: int) -> None:
         """Have every receiver's error be learned anew: the particles are others."""
         self._begun = any(receiver.seated for receiver in self._receivers.values())
+        self._moved = None
+        self._checked = time
         for receiver in self._receivers.values():
             receiver.seated = False
+            receiver.learner.stop()
 
     def moved(self, start: int, end: int) -> None:
         """Let the errors become others, little by little."""
+        if self._moved is not None and self._vehicle.stands != self._stood:
+            self._follow()
+        self._stood = self._vehicle.stands
+        self._moved = (start if self._moved is None else self._moved[0], end)
+        if end - self._moved[0] >= GATHERED:
+            self._follow()
         self._gathered += end - start
-        if self._gathered < FADING:
-            return
-        kept = math.exp(-self._gathered / SECOND / DURATION)
-        self._gathered = 0
+        if self._gathered >= FADING:
+            self._fade()
+        if end - self._checked >= SECOND:
+            self._checked = end
+            self._check()
+
+    def _fade(self) -> None:
+        elapsed, self._gathered = self._gathered / SECOND, 0
         for receiver in self._receivers.values():
             if receiver.seated:
+                kept = math.exp(-elapsed / receiver.parts.duration)
                 self._change(receiver, kept, (1.0 - kept * kept) * receiver.variance)
 
+    def _follow(self) -> None:
+        """Have those who learn go the way that was gathered."""
+        if self._moved is None:
+            return
+        (start, end), self._moved = self._moved, None
+        control = None if self._stood else self._vehicle.control(start, end)
+        for receiver in self._receivers.values():
+            receiver.learner.predict(control, (end - start) / SECOND, receiver.claim)
+
+    def _check(self) -> None:
+        """See whether those who learn still are of the belief, and take what they have learned."""
+        narrow = _narrow(self._belief)
+        for receiver in self._receivers.values():
+            learner = receiver.learner
+            if not narrow or not receiver.seated:
+                learner.stop()
+                continue
+            learner.forget(1.0)
+            receiver.parts = learner.parts
+            given_path = self._vehicle.motion.conditional_variances | self._errors(receiver)
+            mean, covariance = gaussian_of(self._belief, given_path, receiver.bias)
+            if learner.live:
+                away = mean[:2] - learner.mean()[:2]
+                own: Matrix = covariance[:2, :2] + learner.bank.covariance[:, :2, :2].mean(axis=0)
+                if float(away @ np.linalg.solve(own, away)) < FAR:
+                    continue
+            learner.begin(mean, covariance)
+
+    def _errors(self, receiver: Receiver) -> dict[str, float]:
+        return {name: self._belief.particles.variances[name] for name in receiver.bias}
+
     def weighed(self, time: int, measured: Measurement, evidence: Evidence, outlier: bool) -> None:
-        """Nothing: what was weighed was taught by the model itself."""
+        """Have those who learn hear a measurement, as it was stated."""
+        if type(measured.model) not in BATCHED:
+            return
+        for name, receiver in self._receivers.items():
+            if not receiver.learner.live:
+                continue
+            if name == measured.receiver and isinstance(measured.model, Position):
+                self._follow()
+                variance = measured.lasting * measured.repeats
+                weight = 0.0 if self._stood else PRUDENCE / measured.repeats
+                receiver.learner.hear(measured.model, measured.value, variance, measured.log_outlier, weight)
+            elif receiver.is_due(measured, time):
+                self._follow()
+                receiver.learner.witness(measured.model, measured.value)
 
     # --- who disturbs it ------------------------------------------------------------------------------------------
 
@@ -171,6 +268,7 @@ class Receivers:
         if self.knows(measured):
             receiver = self._receivers[measured.receiver or ""]
             self._change(receiver, 0.0, receiver.variance)
+            receiver.learner.stop()
 
     @contextmanager
     def kept(self) -> Generator[None]:
@@ -180,6 +278,13 @@ class Receivers:
         for receiver in self._receivers.values():
             for name, place, before in zip(receiver.bias, PLACE, places, strict=True):
                 self._belief.column(name)[:] += before - self._belief.column(place)
+
+
+def _narrow(belief: ParticleFilter[Any]) -> bool:
+    """Say whether a belief is one place."""
+    moments = belief.moments()
+    plane = float(moments.variance[0] + moments.variance[1])
+    return plane <= 2.0 * NARROW**2 and float(moments.variance[2]) <= NARROW_HEADING**2
 
 
 def biases_of(configuration: Configuration) -> dict[str, Bias]:

@@ -177,21 +177,26 @@ class Witnesses:
         return self.bank.mean[member].copy(), self.bank.covariance[member].copy()
 
 
-def gaussian_of(belief: ParticleFilter[Any], given_path: dict[str, float]) -> tuple[Matrix, Matrix]:
+def gaussian_of(
+    belief: ParticleFilter[Any], given_path: dict[str, float], errors: Sequence[str] = ()
+) -> tuple[Matrix, Matrix]:
     """Return mean and covariance of a belief, over an even sample of its particles.
 
-    The errors of receivers, which come last, are left out: witnesses and the like do not have them as states.
+    The errors of receivers, which come last, are left out, but for those that are asked for.
 
     Parameters
     ----------
     given_path : dict[str, float]
         Variances of the marginalised dimensions beside the spread of the particles' own values.
+    errors : sequence of str
+        Receivers' errors that are to follow the other dimensions.
     """
     step = -(-belief.count // SAMPLE)
     weights = belief.weights[::step].astype(np.float64)
     weights /= weights.sum()
-    size = sum(not name.startswith(RECEIVER_BIAS) for name in belief.names)
-    columns: NDArray[np.float64] = belief.columns[:size, : belief.count : step].astype(np.float64)
+    names = [*(name for name in belief.names if not name.startswith(RECEIVER_BIAS)), *errors]
+    rows = [belief.names.index(name) for name in names]
+    columns: NDArray[np.float64] = belief.columns[rows, : belief.count : step].astype(np.float64)
     heading = columns[_HEADING]
     centre = math.atan2(weights @ np.sin(heading), weights @ np.cos(heading))
     columns[_HEADING] = centre + np.remainder(heading - centre + math.pi, 2.0 * math.pi) - math.pi
@@ -199,6 +204,6 @@ def gaussian_of(belief: ParticleFilter[Any], given_path: dict[str, float]) -> tu
     away = columns - mean[:, None]
     covariance = (away * weights) @ away.T
     for name, variance in given_path.items():
-        row = belief.names.index(name)
+        row = names.index(name)
         covariance[row, row] += variance
     return mean, 0.5 * (covariance + covariance.T)
