@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from drivers.logs.recording import write
-from drivers.sample import AnyReading, RangeBearing, Rotation, Sample, Speed
+from drivers.sample import AnyReading, MotionCommand, RangeBearing, Sample
 
 FIRST_LANDMARK = 6
 """Subjects below are robots, or (-1) bar codes that could not be read."""
@@ -63,8 +63,7 @@ def samples_of(run: Any) -> list[Sample]:
         samples.append(Sample(stamp, stamp, "robot", source, reading))
 
     for time, speed, turn in run["odom"].tolist():
-        say(time, "odometry", Speed(speed))
-        say(time, "odometry", Rotation(-turn))
+        say(time, "odometry", MotionCommand((speed, 0.0, 0.0), -turn, body=True))
     for time, subject, distance, bearing in run["meas"].tolist():
         landmark = int(subject) if subject >= 0 else None
         say(time, "camera", RangeBearing(distance, -bearing, landmark))

@@ -10,7 +10,7 @@ from filters.belief import Belief, Displacement, Moments
 from filters.density.gaussian import radius
 from filters.motion.learned import SlowState
 from filters.motion.prediction import IntervalNoise, process_covariance, velocity_moments
-from filters.motion.standing import StandingUnicycle
+from filters.motion.standing import GYRO_NOISE, StandingUnicycle
 from filters.motion.unicycle import GYRO_BIAS, ODOMETRY_SCALE, UnicycleControl
 from filters.particle import ParticleFilter
 from filters.sensing import Sensor
@@ -19,18 +19,17 @@ from service.config import Configuration
 from service.estimator.carrier import Carrier, Pose
 from service.estimator.controls import Controls, controls_of
 from service.estimator.height import Height, down_of, height_of
+from service.estimator.pace import UNKNOWN_SPEED, UNKNOWN_YAW_RATE, Pace
 from service.estimator.start import Anchor, sensor_states
 from service.estimator.track import SPEED_WINDOW
 from service.geodesy import LocalFrame
 
-UNKNOWN_SPEED = 2.0
-"""m/s; how fast a vehicle may move while its odometry is silent (one standard deviation)."""
-
-UNKNOWN_YAW_RATE = 0.5
-"""rad/s; the same for a silent gyro."""
-
 PERSISTENCE = 2.0
-"""Seconds for which such an unknown motion goes on in one direction: it adds up faster than noise."""
+"""Seconds for which an unknown motion goes on in one direction: it adds up faster than noise."""
+
+TELLS_NOTHING = 1e6
+"""Noise of a yaw rate, as of :data:`GYRO_NOISE`, that says nothing of its bias: wheels that stand count no turn, and a
+command to stand is none to turn, however wrong both are about a turn."""
 
 CHORDS = 4
 """Into how many chords the way from the horizon to now is cut."""
@@ -84,6 +83,7 @@ class GroundVehicle:
         self.slow_states: list[SlowState] = sensor_states(configuration)
         self._height = height_of(configuration)
         self._gait: Gait | None = None
+        self._speed, self._yaw_rate = Pace(UNKNOWN_SPEED), Pace(UNKNOWN_YAW_RATE)
         self._rolled = (-1, -1, -1, UnicycleControl(0.0, 0.0), 0.0)
 
     @property
@@ -98,14 +98,18 @@ class GroundVehicle:
     def predict(self, belief: ParticleFilter[UnicycleControl] | Moved, start: int, end: int) -> None:
         """Move the particles by what the controls say of ``start`` to ``end`` (nanoseconds).
 
-        A belief that is no set of particles moves by its controls while the vehicle stands, too.
+        A belief that is no set of particles moves by its controls while the vehicle stands, too. A gyro that stands
+        reads its bias; wheels and commands do not.
         """
         duration = (end - start) / SECOND
+        self._speed.saw(self.controls.speed(end), duration)
+        self._yaw_rate.saw(self.controls.yaw_rate(end), duration)
         if self._gait is not None:
             self._gait.approach(start, end)
         if self._gait is not None and self._gait.stands and isinstance(belief, ParticleFilter):
             turn = self.rolled(start, end).turn
-            self.motion.stand(belief.column(GYRO_BIAS), belief.weights, turn, duration)
+            noise = GYRO_NOISE if self.controls.feels_turns else TELLS_NOTHING
+            self.motion.stand(belief.column(GYRO_BIAS), belief.weights, turn, duration, noise)
         else:
             with self.motion.as_learned():
                 belief.predict(self.control(start, end), duration)
@@ -134,8 +138,8 @@ class GroundVehicle:
         control = UnicycleControl(
             distance.total,
             turn.total,
-            UNKNOWN_SPEED * math.sqrt(2.0 * PERSISTENCE * max(0.0, distance.unknown)),
-            UNKNOWN_YAW_RATE * math.sqrt(2.0 * PERSISTENCE * max(0.0, turn.unknown)),
+            self._speed.sigma * math.sqrt(2.0 * PERSISTENCE * max(0.0, distance.unknown)),
+            self._yaw_rate.sigma * math.sqrt(2.0 * PERSISTENCE * max(0.0, turn.unknown)),
         )
         self._rolled = (start, end, heard, control, self.controls.doubt(start, end))
         return control
@@ -168,7 +172,7 @@ class GroundVehicle:
         Where the odometry is silent the vehicle may drive as it likes.
         """
         silent = self.controls.distance(time - SPEED_WINDOW // 2, time + SPEED_WINDOW // 2).unknown
-        return self.motion.speed_noise**2 + UNKNOWN_SPEED**2 * min(1.0, silent * SECOND / SPEED_WINDOW)
+        return self.motion.speed_noise**2 + self._speed.sigma**2 * min(1.0, silent * SECOND / SPEED_WINDOW)
 
     def carrier(self, belief: Belief) -> Carrier:
         """Return what carries ``belief`` to now."""
