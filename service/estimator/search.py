@@ -4,15 +4,9 @@ A belief that begins *anywhere* in an area is not weighed at first: a few thousa
 none near the truth. Measurements are gathered instead, and a :class:`~service.estimator.quest.Quest` says where the
 vehicle is; the particles are drawn there.
 
-In flight the unnormalised evidence is followed (:class:`~filters.recovery.AugmentedRecovery`), each reading's relative
-to what it would be on average if the belief were right. Where every kind of absolute sensor asks for most of the
-particles anew, a quest runs beside the belief, over ticks. What it finds is a rival, not yet the belief: both are asked
-to predict the measurements that come next. With L the ratio of the rival's evidence to the belief's over all of these,
-
-    P(L ever exceeds 1 / a) <= a        if the belief is right (Ville's inequality: L is then a martingale of mean 1)
-
-so a rival that must reach 1 / a to win replaces a right belief with a probability of at most a per quest, however long
-it is watched. One outlier, or ten from anywhere, do not win: the rival must explain them one after the other.
+In flight an :class:`~service.estimator.alarm.Alarm` follows the evidence. Where every kind of absolute sensor asks for
+most of the particles anew, a quest runs beside the belief, over ticks. What it finds is a
+:class:`~service.estimator.rival.Rival`, not yet the belief: first it must predict what comes next, far better than that.
 """
 
 from __future__ import annotations
@@ -22,25 +16,20 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.sample import SECOND
 from filters.belief import Evidence, Moments
-from filters.linearised.shadow import LINEARISED
-from filters.recovery import AugmentedRecovery, expected_log_evidence
-from filters.resampling import systematic
 from filters.sensing import PositionMeasurement, RangeBearingMeasurement, RangeMeasurement
 from filters.sensing.biased_range import BiasedRangeMeasurement
 from service.config import Configuration
+from service.estimator.alarm import Alarm
 from service.estimator.hearing import Heard, Likelihood
 from service.estimator.measuring import Measurement
-from service.estimator.quest import POINTS, Box, Quest
+from service.estimator.quest import Box, Quest
+from service.estimator.rival import TRIAL, Columns, Rival
 from service.estimator.start import MARGINALISED
 from service.estimator.vehicle import Vehicle
 from service.estimator.way import way_of
-
-Array = NDArray[np.float64]
-Columns = dict[str, Array]
 
 MEMORY = 6 * SECOND
 """How long measurements are remembered for a search."""
@@ -62,71 +51,6 @@ SHARE = 0.25
 """Of the budget, that a search may use in a tick,"""
 PIECE_MS = 1.0
 """with a piece of so many milliseconds. Where a quarter does not suffice for one, one is done all the same."""
-
-FALSE_ALARM = 1e-9
-"""Probability with which one search replaces a belief that is right."""
-
-ALARM = 0.8
-"""Share of the particles to draw anew from which a search is begun."""
-
-LEAST_HEARD = 5
-"""Absolute measurements that a rival must have explained before it may win."""
-
-DISBELIEF = 0.5
-"""Mean surprise of the belief at these from which it is wrong: a rival that is only a little better must wait."""
-
-HOPELESS = -12.0
-"""Logarithm of L below which a rival is given up."""
-
-TRIAL = 10 * SECOND
-"""After which it is given up anyhow."""
-
-SILENCE = 5 * SECOND
-"""A kind of sensor that has been silent for so long has no say."""
-
-FAST = 0.25
-SLOW = 0.002
-"""Rates of the averages of the evidence."""
-
-
-class Rival:
-    """What a finished quest found, and how well it predicts since.
-
-    Attributes
-    ----------
-    log_ratio : float
-        Logarithm of L.
-    heard : int
-        Absolute measurements that both have predicted.
-    surprise : float
-        The belief's own surprise at these, summed.
-    """
-
-    def __init__(self, columns: Columns, moment: int) -> None:
-        self.columns = columns
-        self.moment = moment
-        self.log_ratio = 0.0
-        self.heard = 0
-        self.surprise = 0.0
-        self.log_weights: Array = np.zeros(POINTS)
-
-    def weigh(self, log_likelihood: Array, one: Heard) -> None:
-        """Take one more measurement into the comparison."""
-        before, after = self.log_weights, self.log_weights + log_likelihood
-        self.log_ratio += _log_sum(after) - _log_sum(before) - max(one.log_mean, -1e3)
-        self.log_weights = after
-        if one.measured.absolute:
-            self.heard += 1
-            self.surprise += one.surprise
-
-    @property
-    def wins(self) -> bool:
-        """Whether it has explained enough, and the belief has not."""
-        return (
-            self.heard >= LEAST_HEARD
-            and self.surprise >= DISBELIEF * self.heard
-            and self.log_ratio >= -math.log(FALSE_ALARM)
-        )
 
 
 class Search:
@@ -176,17 +100,13 @@ class Search:
         self._quest: Quest | None = None
         self._later: list[Heard] = []
         self._rival: Rival | None = None
-        self._recovery = AugmentedRecovery(SLOW, FAST)
-        self._kinds: dict[str, int] = {}
-        self._moments: Moments | None = None
+        self._alarm = Alarm()
 
     # --- what the estimator tells -----------------------------------------------------------------------------------
 
     def started(self, time: int) -> None:
         """Hear that the belief began, or began anew."""
-        self._recovery = AugmentedRecovery(SLOW, FAST)
-        self._kinds.clear()
-        self._moments = None
+        self._alarm = Alarm()
         self._drop()
 
     def moved(self, start: int, end: int) -> None:
@@ -195,7 +115,7 @@ class Search:
 
     def published(self, moments: Moments) -> None:
         """Hear what the belief says of itself at the end of a tick."""
-        self._moments = moments
+        self._alarm.moments = moments
 
     def weighed(self, time: int, measured: Measurement, evidence: Evidence, outlier: bool) -> None:
         """Hear that the particles were weighed by ``measured``, and what it said of them."""
@@ -204,7 +124,7 @@ class Search:
         one = Heard(time, measured, evidence.log_mean, measured.surprise(evidence.log_mean))
         self._note(one)
         if measured.absolute:
-            self._observe(one)
+            self._alarm.observe(one)
 
     def heard(self, time: int, measured: Measurement) -> None:
         """Take a measurement while the belief is blind."""
@@ -230,46 +150,11 @@ class Search:
         self._heard.clear()
         self._drop()
 
-    # --- the evidence -----------------------------------------------------------------------------------------------
-
-    def _observe(self, one: Heard) -> None:
-        """Follow the evidence of one kind of sensor."""
-        kind = one.measured.name.split("/", 1)[0]
-        expected = self._expected(one.measured)
-        if expected is None:
-            return
-        if kind not in self._kinds:
-            self._recovery.observe(kind, 0.0)  # a belief is taken to be right until it is heard to be wrong
-        self._kinds[kind] = one.time
-        self._recovery.observe(kind, one.log_mean, expected)
-        for other, last in list(self._kinds.items()):
-            if one.time - last > SILENCE:
-                del self._kinds[other]
-                self._recovery.forget(other)
-
-    def _expected(self, measured: Measurement) -> float | None:
-        """Return the log evidence that the measurement has on average if the belief is right."""
-        make, moments = LINEARISED.get(type(measured.model)), self._moments
-        if make is None or moments is None:
-            return None
-        rows = {name: row for row, name in enumerate(moments.names)}
-        said = make(measured.model).expect(rows, moments.mean, measured.value)
-        covariance = np.diag(moments.variance)
-        covariance[:3, :3] = moments.pose_covariance
-        variances = np.diagonal(said.jacobian @ covariance @ said.jacobian.T + said.noise)
-        return expected_log_evidence(map(float, variances))
-
     @property
     def idle(self) -> bool:
         """Whether there is nothing to search for."""
         searching = self.blind or self._quest is not None or self._rival is not None
-        return not searching and not (self._watching and self.alarmed)
-
-    @property
-    def alarmed(self) -> bool:
-        """Whether every kind of absolute sensor says that most of the belief is wrong."""
-        shares = self._recovery.shares
-        return bool(shares) and min(shares.values()) >= ALARM
+        return not searching and not (self._watching and self._alarm.raised)
 
     # --- one tick ---------------------------------------------------------------------------------------------------
 
@@ -282,11 +167,11 @@ class Search:
                 if self._quest.advance():
                     self._finish(self._quest)
                     break
-        if self._rival is not None and self._tired(self._rival, time):
+        if self._rival is not None and not self.blind and self._rival.hopeless(time):
             self._drop()
 
     def _begin(self, time: int) -> None:
-        if not (self.blind or (self._watching and self.alarmed)):
+        if not (self.blind or (self._watching and self._alarm.raised)):
             return
         heard = list(self._heard)
         absolute = [one for one in heard if one.measured.absolute]
@@ -323,7 +208,7 @@ class Search:
 
     def _finish(self, quest: Quest) -> None:
         self._quest = None
-        self._rival = Rival(dict(quest.columns), quest.moment)
+        self._rival = Rival(quest.columns, quest.moment)
         if not self.blind:
             for one in self._later:
                 self._judge(self._rival, one)
@@ -334,9 +219,6 @@ class Search:
             return
         shape = self._way.shape(rival.moment, [one.time])
         rival.weigh(Likelihood(self._names, [one], shape).log(rival.columns), one)
-
-    def _tired(self, rival: Rival, time: int) -> bool:
-        return not self.blind and (rival.log_ratio < HOPELESS or time - rival.moment > TRIAL)
 
     def _drop(self) -> None:
         self._quest = self._rival = None
@@ -356,16 +238,7 @@ class Search:
         generator = np.random.Generator(
             np.random.Philox(key=np.array((self._seed, 2**32 + self.quests), np.uint64))
         )
-        weights = np.exp(rival.log_weights - rival.log_weights.max())
-        chosen = systematic(weights, count, 1.0 - generator.random())
-        generator.shuffle(chosen)
-        columns = {name: column[chosen] for name, column in rival.columns.items()}
-        shape = self._way.shape(rival.moment, [time])
-        poses = shape.poses(columns)
-        blur, swing = math.sqrt(float(shape.variance[0])), math.sqrt(float(shape.turn_variance[0]))
-        columns["north"] = poses.north[0] + blur * generator.standard_normal(count)
-        columns["east"] = poses.east[0] + blur * generator.standard_normal(count)
-        columns["heading"] = poses.heading[0] + swing * generator.standard_normal(count)
+        columns = rival.draw(self._way.shape(rival.moment, [time]), count, generator)
         for name, (mean, _) in MARGINALISED.items():
             if name in columns:
                 columns[name] = np.full(count, mean)
@@ -393,8 +266,3 @@ def _reach(measured: Measurement, far: float) -> tuple[float, float, float] | No
     if isinstance(value, PositionMeasurement):
         return value.north, value.east, 5.0 * (value.sigma_north or 3.0) + 5.0 + far
     return None
-
-
-def _log_sum(logs: Array) -> float:
-    top = float(logs.max())
-    return top + math.log(float(np.exp(logs - top).sum()))
