@@ -38,6 +38,13 @@ def alone() -> Iterator[None]:
         yield
 
 
+def replace(path: Path, text: str) -> None:
+    """Write a file at once or not at all, whoever reads it or interrupts."""
+    part = path.with_name(path.name + ".part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(path)
+
+
 def everything() -> dict[str, Any]:
     """Return all that was counted so far: by part, then by name."""
     return json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.is_file() else {}
@@ -58,7 +65,7 @@ def keep(part: str, name: str, said: dict[str, Any], command: list[str]) -> None
     with alone():
         kept = everything()
         kept.setdefault(part, {})[name] = one
-        KEPT.write_text(json.dumps(kept) + "\n", encoding="utf-8")
+        replace(KEPT, json.dumps(kept) + "\n")
 
 
 def standing(markers: tuple[str, str]) -> str:
@@ -71,4 +78,4 @@ def put(markers: tuple[str, str], table: str) -> None:
     """Make anew what stands in the page between two markers; call it :func:`alone`."""
     begin, end = markers
     text = PAGE.read_text(encoding="utf-8")
-    PAGE.write_text(f"{text.split(begin)[0]}{begin}\n{table}\n{end}{text.split(end)[1]}", encoding="utf-8")
+    replace(PAGE, f"{text.split(begin)[0]}{begin}\n{table}\n{end}{text.split(end)[1]}")
