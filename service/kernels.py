@@ -20,6 +20,8 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
+from service import machine_code
+
 _KEPT = 3
 """How many digests a cache keeps: the newest, and those of two other versions that may still be in use."""
 
@@ -192,9 +194,13 @@ def _without(names: Sequence[str]) -> Generator[None]:
 def _warm(modules: Callable[[], Sequence[str]], progress: Progress) -> Path:
     folder = prepare()
     with _without(_NEEDLESS):
-        from filters.kernels import compile_all
+        from filters.kernels import compile_all, gather
 
-        compile_all(modules(), progress)
+        kernels = gather(modules())
+        linked = machine_code.link(folder, kernels)
+        compile_all((), progress)  # those that are not linked
+        if kernels and not linked:
+            machine_code.keep(folder, kernels)
     os.utime(folder)
     _prune(folder)
     return folder

@@ -4,6 +4,6 @@ Every kernel takes whole columns and the bounds ``first`` and ``last`` of the bl
 motion and sensor model lies the model's own kernel, in the model's file.
 """
 
-from filters.kernels.compile import compile_all, every_module, kernel
+from filters.kernels.compile import compile_all, every_module, gather, kernel
 
-__all__ = ["compile_all", "every_module", "kernel"]
+__all__ = ["compile_all", "every_module", "gather", "kernel"]

@@ -2,8 +2,8 @@
 
 A *kernel* is a small function over columns with one explicit signature: it is compiled when its module is
 imported, or loaded from numba's cache. A *function* is scalar arithmetic that a kernel calls and LLVM
-inlines. Neither reads anything but its arguments, so both run as plain Python too (``NUMBA_DISABLE_JIT=1``),
-slowly.
+inlines. A *part* is what several kernels have in common, compiled as if each had it written out. None reads
+anything but its arguments, so all run as plain Python too (``NUMBA_DISABLE_JIT=1``), slowly.
 
 Two sets of floating-point flags, because the compiler may reorder one and not the other:
 
@@ -43,7 +43,10 @@ INTERPRETED = bool(cast(Any, config).DISABLE_JIT)
 class Compiled(Protocol):
     """What of numba's result of a compilation is used here."""
 
-    entry_point: Callable[..., Any]
+    @property
+    def entry_point(self) -> Callable[..., Any]:
+        """What Python calls."""
+        ...
 
 
 class Dispatcher(Protocol):
@@ -55,6 +58,10 @@ class Dispatcher(Protocol):
 
     def compile(self, sig: str) -> object:
         """Compile one signature, or load it from the cache."""
+        ...
+
+    def add_overload(self, cres: object) -> None:
+        """Take what a compilation came to."""
         ...
 
     def disable_compile(self) -> None:
@@ -86,16 +93,25 @@ class Pending:
     def __init__(self, name: str, signature: str, dispatcher: Dispatcher) -> None:
         self.name = name
         self.signature = signature
-        self._dispatcher = dispatcher
-        self._compiled = False
+        self.dispatcher = dispatcher
+        self.compiled = False
 
     def compile(self) -> None:
         """Compile it, or load it from the cache, once."""
-        if not self._compiled:
-            self._dispatcher.compile(self.signature)
-            self._dispatcher.disable_compile()
-            self._dispatcher.direct = next(iter(self._dispatcher.overloads.values())).entry_point
-            self._compiled = True
+        if not self.compiled:
+            self.dispatcher.compile(self.signature)
+            self._settle()
+
+    def take(self, made: Compiled) -> None:
+        """Take the machine code of an earlier compilation, see :mod:`filters.kernels.linking`."""
+        if not self.compiled:
+            self.dispatcher.add_overload(made)
+            self._settle()
+
+    def _settle(self) -> None:
+        self.dispatcher.disable_compile()
+        self.dispatcher.direct = next(iter(self.dispatcher.overloads.values())).entry_point
+        self.compiled = True
 
 
 _kernels: dict[str, Pending] = {}
@@ -140,6 +156,11 @@ def function(python: F) -> F:
     return cast(F, compiler(python))
 
 
+def part(python: F) -> F:
+    """Make what several kernels have in common: part of each, with the flags of each."""
+    return cast(F, cast(Callable[..., Callable[[F], Any]], numba.njit)(inline="always")(python))
+
+
 @contextmanager
 def _deferred() -> Generator[None]:
     global _deferring  # noqa: PLW0603  the decorator runs at import, where no argument can reach it
@@ -154,6 +175,14 @@ def every_module() -> list[str]:
     """Return the names of all modules of ``filters``."""
     package = importlib.import_module("filters")
     return [module.name for module in pkgutil.walk_packages(package.__path__, "filters.")]
+
+
+def gather(modules: Sequence[str]) -> list[Pending]:
+    """Import modules, and return every kernel that is known then; what came with them is not compiled yet."""
+    with _deferred():
+        for module in modules:
+            importlib.import_module(module)
+    return list(_kernels.values())
 
 
 def compile_all(modules: Sequence[str], progress: Progress | None = None) -> int:
@@ -172,11 +201,9 @@ def compile_all(modules: Sequence[str], progress: Progress | None = None) -> int
     int
         How many kernels there are.
     """
-    with _deferred():
-        for module in modules:
-            importlib.import_module(module)
-    total = len(_kernels)
-    for index, pending in enumerate(list(_kernels.values())):
+    kernels = gather(modules)
+    total = len(kernels)
+    for index, pending in enumerate(kernels):
         if progress is not None:
             progress(pending.name, index, total)
         pending.compile()
