@@ -14,9 +14,8 @@ from typing import NamedTuple
 from numpy import float32
 
 from filters.kernels.compile import Float32Array, kernel
-from filters.kernels.elementary import exp, log_mixture
 from filters.particle_set import ParticleSet
-from filters.sensing.learned_bias import learn, lesson
+from filters.sensing.learned_bias import learn, lesson, weighed
 from filters.sensing.robust import check, sigma_refusal
 
 
@@ -119,9 +118,6 @@ def ascend(
     log_weight = log_weights[first:last]
     for i in range(last - first):
         r = float32(measured + down[i] - bias_slope * bias[i])
-        q = float32(gain * r)
-        square = float32(q * q)
-        both = log_mixture(square, log_inlier, log_outlier)
-        log_weight[i] += both
-        inlier = exp(float32(min(float32(log_inlier - square - both), float32(0.0))))
-        bias[i] += float32(teach * float32(inlier * r))
+        density, step = weighed(r, gain, log_inlier, log_outlier, teach)
+        log_weight[i] += density
+        bias[i] += step

@@ -17,6 +17,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy import float32
+
+from filters.kernels.compile import part
+from filters.kernels.elementary import Real, exp, log_mixture
 from filters.particle_set import ParticleSet
 from filters.sensing.robust import mixture
 
@@ -78,3 +83,15 @@ def learn(
     wild = outliers / span * math.exp(min(700.0, -log_mean)) if log_mean > -math.inf else 1.0
     inlier = max(0.0, 1.0 - wild)
     particles.variances[bias] = variance * (1.0 - inlier * variance / (variance + sigma * sigma))
+
+
+@part
+def weighed(
+    residual: np.float32, gain: Real, log_inlier: Real, log_outlier: Real, teach: Real
+) -> tuple[np.float32, np.float32]:
+    """Log density of a particle's residual, and how far it moves the mean of the bias, by the numbers of a lesson."""
+    q = float32(gain * residual)
+    square = float32(q * q)
+    both = log_mixture(square, log_inlier, log_outlier)
+    inlier = exp(float32(min(float32(log_inlier - square - both), float32(0.0))))
+    return both, float32(teach * float32(inlier * residual))

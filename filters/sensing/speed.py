@@ -20,15 +20,15 @@ part.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from numpy import float32
 
 from filters.kernels.compile import Float32Array, kernel
-from filters.kernels.elementary import exp, log_mixture
 from filters.particle_set import ParticleSet
-from filters.sensing.learned_bias import Lesson, learn, lesson
+from filters.sensing.learned_bias import Lesson, learn, lesson, weighed
 from filters.sensing.robust import check, sigma_refusal
 
 ODOMETRY_SCALE = "odometry_scale"
@@ -78,7 +78,10 @@ class GroundSpeedMeasurement(NamedTuple):
     loose: float = 0.0
 
 
-class _Speed:
+Said = TypeVar("Said", WheelSpeedMeasurement, GroundSpeedMeasurement)
+
+
+class _Speed(ABC, Generic[Said]):
     """What both models of a speed have in common.
 
     Parameters
@@ -115,6 +118,14 @@ class _Speed:
         self.scale = scale
         self.bias = bias
 
+    @abstractmethod
+    def spread(self, measurement: Said) -> float:
+        """Return the measurement's standard deviation, m/s."""
+
+    def learn(self, particles: ParticleSet, measurement: Said, log_mean: float) -> None:
+        """Take what was learned of the bias off its variance; see :class:`filters.sensing.model.Learner`."""
+        learn(particles, self.bias, self.spread(measurement), self.outliers, self.span, log_mean)
+
     def _refusal(self, speed: float, sigma: float | None) -> str | None:
         if abs(speed) > self.span:
             return f"speed must lie within {self.span:g} m/s"
@@ -132,7 +143,7 @@ class _Speed:
         return scale * speed + (0.0 if self.bias is None else centre[self.bias])
 
 
-class WheelSpeed(_Speed):
+class WheelSpeed(_Speed[WheelSpeedMeasurement]):
     """Gaussian speed, of a vehicle whose speed is a control, with an outlier part uniform over ``span``."""
 
     def refusal(self, measurement: WheelSpeedMeasurement) -> str | None:
@@ -169,10 +180,6 @@ class WheelSpeed(_Speed):
         )
         return told.log_peak
 
-    def learn(self, particles: ParticleSet, measurement: WheelSpeedMeasurement, log_mean: float) -> None:
-        """Take what was learned of the bias off its variance; see :class:`filters.sensing.model.Learner`."""
-        learn(particles, self.bias, self.spread(measurement), self.outliers, self.span, log_mean)
-
     def innovation(self, centre: Mapping[str, float], measurement: WheelSpeedMeasurement) -> float:
         """Measured less expected speed at the centre, m/s."""
         turning = measurement.yaw_rate - centre[GYRO_BIAS]
@@ -180,7 +187,7 @@ class WheelSpeed(_Speed):
         return measurement.speed - self._said(centre, speed)
 
 
-class GroundSpeed(_Speed):
+class GroundSpeed(_Speed[GroundSpeedMeasurement]):
     """Gaussian speed, of a vehicle whose velocity is a state, with an outlier part uniform over ``span``."""
 
     def refusal(self, measurement: GroundSpeedMeasurement) -> str | None:
@@ -219,10 +226,6 @@ class GroundSpeed(_Speed):
             told.teach,
         )
         return told.log_peak
-
-    def learn(self, particles: ParticleSet, measurement: GroundSpeedMeasurement, log_mean: float) -> None:
-        """Take what was learned of the bias off its variance; see :class:`filters.sensing.model.Learner`."""
-        learn(particles, self.bias, self.spread(measurement), self.outliers, self.span, log_mean)
 
     def innovation(self, centre: Mapping[str, float], measurement: GroundSpeedMeasurement) -> float:
         """Measured less expected speed at the centre, m/s."""
@@ -264,12 +267,9 @@ def rolling(
         speed = float32(odometry[i] * rolled - right * float32(yaw_rate - gyro[i]))
         factor = float32(scale_slope * scale[i] + float32(float32(1.0) - scale_slope))
         r = float32(measured - float32(factor * speed + bias_slope * bias[i]))
-        q = float32(gain * r)
-        square = float32(q * q)
-        both = log_mixture(square, log_inlier, log_outlier)
-        log_weight[i] += both
-        inlier = exp(float32(min(float32(log_inlier - square - both), float32(0.0))))
-        bias[i] += float32(teach * float32(inlier * r))
+        density, step = weighed(r, gain, log_inlier, log_outlier, teach)
+        log_weight[i] += density
+        bias[i] += step
 
 
 @kernel(
@@ -304,9 +304,6 @@ def moving(
         speed = float32(math.sqrt(float32(north[i] * north[i] + east[i] * east[i] + loose)))
         factor = float32(scale_slope * scale[i] + float32(float32(1.0) - scale_slope))
         r = float32(measured - float32(factor * speed + bias_slope * bias[i]))
-        q = float32(gain * r)
-        square = float32(q * q)
-        both = log_mixture(square, log_inlier, log_outlier)
-        log_weight[i] += both
-        inlier = exp(float32(min(float32(log_inlier - square - both), float32(0.0))))
-        bias[i] += float32(teach * float32(inlier * r))
+        density, step = weighed(r, gain, log_inlier, log_outlier, teach)
+        log_weight[i] += density
+        bias[i] += step
