@@ -130,6 +130,16 @@ class Receivers:
         self._stood = False
         self._checked = 0
 
+    def of(self, name: str) -> Receiver:
+        """Return the receiver of a name.
+
+        Raises
+        ------
+        KeyError
+            There is none of that name.
+        """
+        return self._receivers[name]
+
     def knows(self, measured: Measurement) -> bool:
         """Say whether a measurement is a fix with an error that is a state."""
         return measured.receiver in self._receivers and measured.lasting > 0.0
@@ -139,7 +149,7 @@ class Receivers:
         value: object = measured.value
         if not (self.knows(measured) and isinstance(value, PositionMeasurement)):
             return measured
-        receiver = self._receivers[measured.receiver or ""]
+        receiver = self.of(measured.receiver or "")
         if receiver.model is None:
             assert isinstance(measured.model, Position)
             receiver.model = BiasedPosition(measured.model, receiver.bias)
@@ -266,7 +276,7 @@ class Receivers:
     def distrusted(self, measured: Measurement) -> None:
         """Forget the error of a receiver that is not believed: when it is believed again it will be another."""
         if self.knows(measured):
-            receiver = self._receivers[measured.receiver or ""]
+            receiver = self.of(measured.receiver or "")
             self._change(receiver, 0.0, receiver.variance)
             receiver.learner.stop()
 
