@@ -32,7 +32,7 @@ _NEEDLESS = ("scipy.linalg", "coverage")
 """What numba imports if it is there, and no kernel uses: linear algebra, and a tool of its own developers. It takes a
 fifth of a start."""
 
-_KERNEL = re.compile(rb"(?m)^@(kernel|function)\b")
+_KERNEL = re.compile(rb"(?m)^@(kernel|function|part)\b")
 _IMPORT = re.compile(r"(?m)^from (filters(?:\.\w+)*) import (\([^)]*\)|.*)")
 
 Progress = Callable[[str, int, int], None]
@@ -72,9 +72,7 @@ def _sources() -> dict[str, bytes]:
     # found without importing it: once imported, its kernels have chosen their cache
     found = find_spec("filters")
     folder = Path(str(found.origin)).parent if found and found.origin else Path()
-    wanted = [
-        path for path in folder.rglob("*.py") if re.search(rb"(?m)^@(kernel|function)\b", path.read_bytes())
-    ]
+    wanted = [path for path in folder.rglob("*.py") if _KERNEL.search(path.read_bytes())]
     sources: dict[str, bytes] = {}
     while wanted:
         path = wanted.pop()
