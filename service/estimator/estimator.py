@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.sample import Sample
+from drivers.sample import SECOND, Sample
 from filters.crew import Crew
 from filters.particle import ParticleFilter
 from service.checkpoint import Kept
@@ -42,7 +42,6 @@ from service.estimator.search import Search
 from service.estimator.start import Anchor, draw
 from service.estimator.starting import Starter
 from service.estimator.stopwatch import KALMAN, Silent, Stopwatch
-from service.estimator.track import SECOND
 from service.estimator.trust import trust_of
 from service.estimator.vehicle import Vehicle, vehicle_of
 from service.health import Facts, HealthMonitor

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any, cast
 
+from drivers.sample import SECOND
 from filters.particle import ParticleFilter
 from filters.sensing.altitude import Altitude
 from service.estimator.binding import CONTROL, Measurement, Place, Refusal
@@ -24,7 +25,6 @@ from service.estimator.records import SensorRecord
 from service.estimator.search import Search
 from service.estimator.stopwatch import KALMAN, WITNESSES, Stopwatch
 from service.estimator.thinning import spaced
-from service.estimator.track import SECOND
 from service.estimator.trust import Trust
 from service.estimator.vehicle import Vehicle
 from service.health import HealthMonitor

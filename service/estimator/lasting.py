@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from drivers.sample import SECOND
 from filters.belief import Evidence
 from filters.consider import LastingError
 from filters.density.gaussian import radius
@@ -20,7 +21,6 @@ from filters.sensing import PositionMeasurement
 from service.estimator.carrier import Pose
 from service.estimator.measuring import Measurement
 from service.estimator.receivers import Receivers
-from service.estimator.track import SECOND
 
 DURATION = 60.0
 """Seconds over which reflections and atmosphere change what a receiver says."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Any
 
+from drivers.sample import SECOND
 from filters.kld import Demand
 from filters.particle import ParticleFilter
 from filters.policy import EffectiveShare, Policy, Wear, WhenStill
@@ -13,7 +14,6 @@ from service.config import Configuration
 from service.estimator.hypotheses import Tracker
 from service.estimator.receivers import Receivers
 from service.estimator.stopwatch import Stopwatch
-from service.estimator.track import SECOND
 
 RESAMPLING: Policy = WhenStill(still=EffectiveShare(0.05), moving=EffectiveShare(0.5))
 """When to resample: equation 4.36's effective sample size below half of the particles there are. What is forgotten

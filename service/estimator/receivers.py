@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from drivers.sample import SECOND
 from filters.belief import Evidence
 from filters.kalman import Matrix
 from filters.linearised.bank import BATCHED
@@ -31,7 +32,6 @@ from service.config import Configuration
 from service.estimator.ground import GroundVehicle
 from service.estimator.measuring import Measurement
 from service.estimator.start import receiver_name
-from service.estimator.track import SECOND
 from service.estimator.witnesses import gaussian_of
 
 PLACE = ("north", "east")

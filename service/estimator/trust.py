@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.sample import Sample
+from drivers.sample import SECOND, Sample
 from filters.belief import Evidence
 from filters.binary import BinaryBayesFilter
 from filters.error_level import ErrorLevel, Opinion, Testimony
@@ -36,7 +36,6 @@ from filters.sensing.speed import WheelSpeed
 from service.config import Configuration
 from service.estimator.lie import Lie
 from service.estimator.measuring import Measurement
-from service.estimator.track import SECOND
 from service.estimator.vehicle import Vehicle
 from service.estimator.witnesses import SPAN, WILD, Witnesses, gaussian_of
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.sample import SECOND
 from filters.error_level import ErrorLevel, Opinion
 from filters.kalman import Matrix
 from filters.kernels.expectations import note
@@ -26,7 +27,6 @@ from filters.motion.unicycle import Unicycle
 from filters.particle import ParticleFilter
 from service.estimator.measuring import Measurement
 from service.estimator.start import RECEIVER_BIAS
-from service.estimator.track import SECOND
 
 SPAN = 120 * SECOND
 """How old a witness gets. Half of it must be longer than the slowest drag-off takes to be seen: 20 m at 0.5 m/s."""
