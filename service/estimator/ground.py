@@ -21,7 +21,7 @@ from service.estimator.controls import Controls, controls_of
 from service.estimator.height import Height, down_of, height_of
 from service.estimator.pace import UNKNOWN_SPEED, UNKNOWN_YAW_RATE, Pace
 from service.estimator.start import Anchor, sensor_states
-from service.estimator.track import SPEED_WINDOW
+from service.estimator.track import SPEED_WINDOW, Motion
 from service.geodesy import LocalFrame
 
 PERSISTENCE = 2.0
@@ -138,8 +138,8 @@ class GroundVehicle:
         control = UnicycleControl(
             distance.total,
             turn.total,
-            self._speed.sigma * math.sqrt(2.0 * PERSISTENCE * max(0.0, distance.unknown)),
-            self._yaw_rate.sigma * math.sqrt(2.0 * PERSISTENCE * max(0.0, turn.unknown)),
+            self._speed.sigma * _strayed(distance),
+            self._yaw_rate.sigma * _strayed(turn),
         )
         self._rolled = (start, end, heard, control, self.controls.doubt(start, end))
         return control
@@ -229,6 +229,19 @@ class GroundVehicle:
         measured = down_of(reading, frame)
         if measured is not None:
             self._height.correct(measured[0], repeats * measured[1] ** 2)
+
+
+def _strayed(motion: Motion) -> float:
+    """Return how far, in seconds of an unknown rate, what is not known of an interval may lead (standard deviation).
+
+    A rate that goes on for :data:`PERSISTENCE` τ (Ornstein, Uhlenbeck) adds up to 2 τ² (t/τ - 1 + exp(-t/τ)) after a
+    time t: t² in the beginning, 2 τ t in the end. An interval has what is added between its two ends.
+    """
+    if motion.unknown <= 0.0:
+        return 0.0
+    begin = math.exp(-motion.since / PERSISTENCE)
+    end = begin * math.exp(-motion.unknown / PERSISTENCE)
+    return math.sqrt(2.0 * PERSISTENCE * max(0.0, motion.unknown - PERSISTENCE * (begin - end)))
 
 
 class GroundCarrier:

@@ -6,6 +6,7 @@ restarted) the seconds without knowledge are totalled beside it.
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -25,10 +26,14 @@ stay in the totals for ever."""
 
 
 class Motion(NamedTuple):
-    """What a control says of an interval: the total, and for how many seconds of it nothing is known."""
+    """What a control says of an interval: the total, and for how many seconds of it nothing is known.
+
+    ``since`` is for how many seconds nothing had been known when the interval began.
+    """
 
     total: float
     unknown: float
+    since: float = math.inf
 
 
 class Track:
@@ -79,7 +84,11 @@ class Track:
         """Return the motion from ``start`` to ``end`` (nanoseconds), interpolated; beyond the last point, held."""
         total_start, unknown_start = self._at(start)
         total_end, unknown_end = self._at(end)
-        return Motion(total_end - total_start, unknown_end - unknown_start)
+        if unknown_end <= unknown_start:
+            return Motion(total_end - total_start, unknown_end - unknown_start)
+        last = bisect_right(self._times, start) - 1
+        since = math.inf if last < 0 else unknown_start - self._unknown[last]
+        return Motion(total_end - total_start, unknown_end - unknown_start, since)
 
     def totals(self, times: Sequence[int]) -> list[float]:
         """Return the total at each of ``times``, all from one beginning."""
@@ -153,6 +162,13 @@ class RateTrack(Track):
         if done:
             self._rate = rate
         return done
+
+    def _hold(self) -> tuple[float, int]:
+        """Note the rate that holds; the first one there is tells it by itself."""
+        if len(self._times) > 1:
+            return super()._hold()
+        self._held_rate = (self._rate / SECOND, GAP)
+        return self._held_rate
 
 
 class TotalTrack(Track):

@@ -152,7 +152,7 @@ def test_a_broken_number_is_counted_and_leaves_the_totals_alone(broken: float) -
             controls.take(sample(at, Odometer((0.05 * k,))))
             controls.take(imu(at, 0.5))
     assert controls.implausible == 4  # to the broken total and back from it, a rate, a motor
-    assert controls.turn(0, SECOND) == pytest.approx((0.5, 0.0))
+    assert controls.turn(0, SECOND)[:2] == pytest.approx((0.5, 0.0))
     distance = controls.distance(0, SECOND)
     assert distance.total == pytest.approx(0.9)
     assert distance.unknown == pytest.approx(0.1)

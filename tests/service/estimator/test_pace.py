@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from drivers.sample import AnyReading, MotionCommand, Rotation, Sample, Speed
@@ -67,7 +69,31 @@ def test_a_silence_widens_a_slow_robot_by_its_own_pace_only() -> None:
         end = drive(ground, SHOWN + 2.0, Speed(speed), Rotation(0.0))
         silent = ground.rolled(end, end + 2 * SECOND)
         assert silent.distance == pytest.approx(0.5 * speed, rel=0.01)
-        assert silent.distance_sigma == pytest.approx(pace * math.sqrt(2.0 * PERSISTENCE * 1.5), rel=0.01)
+        spread = 2.0 * PERSISTENCE**2 * (1.5 / PERSISTENCE - 1.0 + math.exp(-1.5 / PERSISTENCE))
+        assert silent.distance_sigma == pytest.approx(pace * math.sqrt(spread), rel=0.01)
+
+
+def test_a_silence_widens_the_belief_alike_whatever_the_strides() -> None:
+    """Against many speeds that each wander with the time constant and are added up in small steps (1 % at 2 sigma)."""
+    ground = vehicle()
+    end = drive(ground, 1.0, Speed(0.0), Rotation(0.0))
+    marks = range(end + SECOND // 2, end + 5 * SECOND // 2 + 1, SECOND // 10)
+    strides = [ground.rolled(start, stop).distance_sigma ** 2 for start, stop in pairwise(marks)]
+    assert math.sqrt(sum(strides)) == pytest.approx(ground.rolled(marks[0], marks[-1]).distance_sigma)
+    random = np.random.default_rng(0)
+    speed, way, step = UNKNOWN_SPEED * random.normal(size=20_000), np.zeros(20_000), 0.01
+    keeps = math.exp(-step / PERSISTENCE)
+    for _ in range(200):
+        fresh = keeps * speed + UNKNOWN_SPEED * math.sqrt(1.0 - keeps**2) * random.normal(size=speed.size)
+        way += 0.5 * step * (speed + fresh)
+        speed = fresh
+    assert math.sqrt(sum(strides)) == pytest.approx(way.std(), rel=0.01)
+
+
+def test_a_first_speed_holds_until_the_second() -> None:
+    ground = vehicle()
+    ground.controls.take(Sample(SECOND, SECOND, "l", "wheels", Speed(1.0)))
+    assert ground.controls.distance(SECOND, 5 * SECOND // 4) == pytest.approx((0.25, 0.0, math.inf))
 
 
 def test_only_what_feels_turns_has_a_bias_to_read_at_a_standstill() -> None:
