@@ -1,8 +1,9 @@
 """Whether the wheels hold the ground: how their speed changes, beside how the accelerometer felt the vehicle change.
 
 Wheels that begin to spin, or that grip again, change their speed within a moment while the vehicle goes on as it did.
-The speed of two neighbouring stretches, less what the forward specific force adds up to from the middle of the one to
-the middle of the other, is nothing but noise as long as they hold. How large that noise is depends on the unit, on how
+The speed of a stretch, less what the forward specific force has added up to by its middle, is level but for noise as
+long as they hold, and so is the median of five: counts that were stamped a moment late make a stretch or two slow or
+fast, and the speed comes back. How large that noise is depends on the unit, on how
 it is mounted and on the ground, so its scale is learned, as that of a Student's t of four degrees of freedom (Lange,
 Little and Taylor, "Robust statistical modeling using the t distribution", JASA 84, 1989: the weights (v + 1) / (v + e²)
 make a few great errors count for little), and with it the mean: an accelerometer that is mounted askew feels gravity.
@@ -15,9 +16,11 @@ accelerometer.
 from __future__ import annotations
 
 import math
+from collections import deque
+from statistics import median
 from typing import NamedTuple, Protocol
 
-from service.estimator.track import Motion
+from service.estimator.track import SECOND, Motion
 
 DEGREES = 4.0
 """Of freedom: one error in 2,000 lies beyond ten scales."""
@@ -25,8 +28,11 @@ DEGREES = 4.0
 FIRST_SCALE, LEAST_SCALE = 0.1, 0.01
 """m/s: where learning begins, and below which no wheel is believed."""
 
-ENOUGH, MEMORY = 50, 200
-"""Stretches of driving before anything is said, and over how many the scale is a mean."""
+ENOUGH, MEMORY = 30, 100
+"""Steps of the median before anything is said, and over how many the scale is a mean."""
+
+MEDIAN = 5
+"""Stretches whose median is taken."""
 
 STANDING = 0.05
 """m/s below which a vehicle stands: its wheels say nothing of the scale."""
@@ -62,11 +68,7 @@ class Said(NamedTuple):
 NOTHING = Said(1.0, 1.0)
 """Where nothing can be said."""
 
-
-class _Stretch(NamedTuple):
-    start: int
-    end: int
-    speed: float
+NEVER = Motion(0.0, 1.0)
 
 
 class Grip:
@@ -88,32 +90,41 @@ class Grip:
     def __init__(self, felt: Felt, slip: float) -> None:
         self._felt = felt
         self._slip = slip
-        self._last: _Stretch | None = None
+        self._end = 0
+        self._middle = 0
+        self._gained = 0.0
+        self._levels: deque[float] = deque(maxlen=MEDIAN + 1)
         self._heard = 0
         self.scale = FIRST_SCALE
         self.mean = 0.0
 
     def ask(self, start: int, end: int) -> Said:
-        """Compare a stretch, nanoseconds, with the one that was asked for before; :data:`NOTHING` if they are apart."""
+        """Compare a stretch, nanoseconds, with those that were asked for before; :data:`NOTHING` if they are apart."""
         wheels = self._felt.distance(start, end)
+        if start != self._end:
+            self._levels.clear()
         if end <= start or wheels.unknown > 0.0 or not self._felt.counted:
-            self._last = None
+            self._end = 0
             return NOTHING
-        now = _Stretch(start, end, wheels.total * 1e9 / (end - start))
-        last, self._last = self._last, now
-        if last is None or last.end != start:
+        last, self._middle, self._end = self._middle, (start + end) // 2, end
+        gained = self._felt.gained(last, self._middle) if self._levels else NEVER
+        if gained.unknown > 0.0:
+            self._levels.clear()
+            self._gained = 0.0
+        self._gained += gained.total
+        speed = wheels.total * SECOND / (end - start)
+        self._levels.append(speed - self._gained)
+        if len(self._levels) <= MEDIAN or abs(speed) < STANDING:
             return NOTHING
-        speed = max(abs(now.speed), abs(last.speed))
-        gained = self._felt.gained((last.start + last.end) // 2, (start + end) // 2)
-        if speed < STANDING or gained.unknown > 0.0:
-            return NOTHING
-        error = now.speed - last.speed - gained.total - self.mean
-        said = (
-            NOTHING
-            if self._heard < ENOUGH
-            else Said(self._odds(error, speed), self._odds(error, gained.total))
-        )
-        self._learn(error)
+        return self._compare(speed, gained.total)
+
+    def _compare(self, speed: float, gained: float) -> Said:
+        before, *same, now = self._levels
+        step = median((*same, now)) - median((before, *same))
+        error = step - self.mean
+        said = NOTHING if self._heard < ENOUGH else Said(self._odds(error, speed), self._odds(error, gained))
+        if step != 0.0:  # a median that stays says nothing of the noise
+            self._learn(error)
         return said
 
     def _odds(self, error: float, speed: float) -> float:
