@@ -138,11 +138,6 @@ class Hypotheses:
         self.leader = self._slots[0].name
         self.labels[:] = 0
 
-    def disown(self, places: NDArray[np.int64]) -> None:
-        """Make strays of some particles: somebody put them there to try, and they are of no hypothesis yet."""
-        self.labels[places] = self._most
-        self._strays = True
-
     def look(self, columns: Float32Array, weights: Float32Array, count: int) -> None:
         """Find out what has changed; to be called a few times a second.
 

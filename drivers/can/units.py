@@ -46,11 +46,6 @@ def si_unit(measures: str) -> str:
     return _FACTORS[measures][0]
 
 
-def known_units(measures: str) -> list[str]:
-    """Return the units that :func:`factor` knows for what is measured."""
-    return list(_FACTORS[measures][1])
-
-
 def factor(measures: str, unit: str) -> float | None:
     """Return the factor from ``unit`` to SI, ``None`` where the text is no unit of what is measured.
 

@@ -35,7 +35,6 @@ class MessageClass(Protocol):
     crc_extra: int
     unpacker: Struct
     ordered_fieldnames: list[str]
-    array_lengths: list[int]
     lengths: list[int]
 
 

@@ -169,18 +169,6 @@ def test_one_without_weight_is_dropped_after_a_while_and_its_strays_may_come_bac
     assert not set(hypotheses.names.values()) >= {1, 2}
 
 
-def test_disowned_particles_are_of_no_hypothesis() -> None:
-    """One particle of a hundred is put 2 km away: the mean does not follow."""
-    rng = np.random.default_rng(9)
-    columns = place(rng, 1000, 0, 0)
-    columns[0, ::100] = 2000.0
-    hypotheses = Hypotheses(1000, 3)
-    hypotheses.disown(np.arange(0, 1000, 100))
-    (only,) = looked(hypotheses, columns, 3).moments(columns, np.ones(1000, np.float32), 1000)
-    assert abs(only.mean[0]) < 0.1
-    assert only.weight == pytest.approx(0.99)
-
-
 def test_the_least_part_is_given_and_the_rest_by_weight() -> None:
     rng = np.random.default_rng(10)
     columns = np.concatenate([place(rng, 500, 0, 0), place(rng, 500, 0, 14)], axis=1)

@@ -17,7 +17,6 @@ from typing import Protocol
 HEADER = b"\xa3\x95"
 HEADER_LENGTH = 3
 FMT = 128
-FMT_LENGTH = 89
 _FMT = struct.Struct("<BB4s16s64s")
 _FMTU = struct.Struct("<QB16s16s")
 _UNIT = struct.Struct("<Qb64s")
