@@ -110,6 +110,9 @@ class Estimator:
         if self._trust is not None:
             self._fusion.trust = self._trust
             self._fusion.companions.append(self._trust)
+        self._fusion.watchers = [
+            one for one in (self._search, self._mode, caution, self._trust) if one is not None
+        ]
         latecomers = latecomers_of(configuration, self._vehicle, self._filter)
         if latecomers is not None:
             self._intake.latecomers = self._fusion.latecomers = latecomers

@@ -11,6 +11,7 @@ from typing import Any, cast
 from drivers.sample import SECOND
 from filters.particle import ParticleFilter
 from filters.sensing.altitude import Altitude
+from service.estimator.attention import Attention
 from service.estimator.binding import CONTROL, Measurement, Place, Refusal
 from service.estimator.caution import Caution
 from service.estimator.companion import Companion
@@ -66,6 +67,8 @@ class Fusion:
         The belief's time, nanoseconds; ``None`` before it began.
     companions : list[Companion]
         Who is told of every step.
+    watchers : list[Companion]
+        Those of them who are told of no more measurements than tell them more.
     deputy : Deputy or None
         Moved and weighed in the particles' place while it speaks.
     search : Search or None
@@ -93,6 +96,7 @@ class Fusion:
     ) -> None:
         self.time: int | None = None
         self.companions: list[Companion] = []
+        self.watchers: list[Companion] = []
         self.deputy: Deputy | None = None
         self.search: Search | None = None
         self.trust: Trust | None = None
@@ -106,6 +110,7 @@ class Fusion:
         self._intake = intake
         self._health = health
         self._stopwatch = stopwatch
+        self._attention = Attention()
 
     @property
     def _acting(self) -> Any:
@@ -132,6 +137,7 @@ class Fusion:
         assert self.time is not None
         fused = False
         course.offered = len(passed)
+        self._attention.next_tick()
         passed = self._thinned(passed, course)
         together = TOGETHER if len(passed) <= FEW else max(TOGETHER, (passed[-1][0] - passed[0][0]) // 4)
         for index, (time, waiting) in enumerate(passed):
@@ -222,7 +228,8 @@ class Fusion:
         if height is not None:
             self._weigh_height(height, time, measured, record)
             return
-        believed = self._believed(time, waiting, measured)
+        attended = self._attention.wants(measured.name, time)
+        believed = self._believed(time, waiting, measured, attended)
         self._charge(WITNESSES)
         if not believed:
             record.refused["distrusted"] += 1
@@ -230,7 +237,7 @@ class Fusion:
                 self.receivers.distrusted(measured)
             return
         self._vehicle.level(self._acting, waiting.sample.reading, self._intake.frame, measured.repeats)
-        self._take_evidence(time, measured, record)
+        self._take_evidence(time, measured, record, attended)
 
     def _measured(self, time: int, waiting: Waiting) -> Measurement | None:
         """Return what was read in its model's terms; ``None``, and the reason counted, where that cannot be."""
@@ -260,10 +267,12 @@ class Fusion:
         record.judge(measured.surprise(evidence.log_mean) > OUTLIER)
         self._charge("sensing")
 
-    def _believed(self, time: int, waiting: Waiting, measured: Measurement) -> bool:
+    def _believed(self, time: int, waiting: Waiting, measured: Measurement, attended: bool) -> bool:
         """Ask whether the sensor is trusted; what one that was just found out did to the belief is taken back."""
         if self.trust is None or (self.search is not None and self.search.blind):
             return True
+        if not attended:
+            return self.trust.believes(waiting.sample, measured)
         believed = self.trust.admits(time, waiting.sample, measured)
         particles = self.trust.take_back()
         if particles is not None:
@@ -280,7 +289,7 @@ class Fusion:
             return self.receivers.split(measured)
         return measured if self.caution is None else self.caution.sized(measured)
 
-    def _take_evidence(self, time: int, measured: Measurement, record: SensorRecord) -> None:
+    def _take_evidence(self, time: int, measured: Measurement, record: SensorRecord, attended: bool) -> None:
         if self.search is not None and self.search.blind:
             self.search.heard(time, measured)
             record.accepted += 1
@@ -294,7 +303,8 @@ class Fusion:
         self._charge("sensing")
         surprise = measured.surprise(evidence.log_mean)
         for companion in self.companions:
-            companion.weighed(time, measured, evidence, surprise > OUTLIER)
+            if attended or companion not in self.watchers:
+                companion.weighed(time, measured, evidence, surprise > OUTLIER)
         self._charge(WITNESSES)
         record.innovation = evidence.innovation
         record.last = time

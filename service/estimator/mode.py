@@ -177,7 +177,7 @@ class Mode:
     def _tell(self, duration: float, control: UnicycleControl, said: Said) -> None:
         """Let the modes change, and weigh them by wheels and gyro, and by wheels and accelerometer."""
         stretch = min(duration, 1.0)  # the filter is told ten times a second
-        if self._bank.live.all():
+        if self._bank.live[0]:
             mix(self._bank, _among_wheeled(stretch), self._modes.belief[1:] + 1e-12)
         if said is NOTHING:
             self._modes.propagate(Drift(GENERATOR, stretch))
@@ -223,7 +223,7 @@ class Mode:
 
     def weighed(self, time: int, measured: Measurement, evidence: Evidence, outlier: bool) -> None:
         """Weigh both Gaussians, and the modes by how well they expected the measurement."""
-        if type(measured.model) not in BATCHED or not self._bank.live.all():
+        if type(measured.model) not in BATCHED or not self._bank.live[0]:
             return
         expectations = self._bank.expect(measured.model, measured.value)
         said = self._bank.correct(expectations, self._bank.live, 0.9999)
@@ -238,7 +238,7 @@ class Mode:
         if wide or float(moments.variance[2]) > NARROW_HEADING**2:
             self._bank.live[:] = False
             return
-        if self._bank.live.all():
+        if self._bank.live[0]:
             away = moments.mean[:2] - self._bank.mean[:, :2]
             spread = self._bank.covariance[:, :2, :2] + moments.pose_covariance[:2, :2] + 0.01 * np.eye(2)
             distances = np.einsum("mi,mij,mj->m", away, np.linalg.inv(spread), away)

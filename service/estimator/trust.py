@@ -179,6 +179,12 @@ class Group:
         leading = [sensor.flagged for sensor in self.sensors.values() if sensor.absolute]
         return any(leading) if leading else all(sensor.flagged for sensor in self.sensors.values())
 
+    def believes(self, sensor: Judged) -> bool:
+        """Say whether one of it is believed: who does not say where the vehicle is may go its own way."""
+        if self.flagged and not sensor.absolute:
+            return not sensor.flagged and self.lie.leaves_alone
+        return not sensor.flagged
+
     @property
     def absolute(self) -> bool:
         """Whether one of it says where the vehicle is."""
@@ -345,9 +351,12 @@ class Trust:
             sensor.compare(opinion, weight)
             self._judge(group, sensor, opinion, next(iter(said.values())).testimony, weight)
             group.lie.hear(time, opinion.testimony, weight, sensor.absolute)
-        if group.flagged and not sensor.absolute:
-            return not sensor.flagged and group.lie.leaves_alone
-        return not sensor.flagged
+        return group.believes(sensor)
+
+    def believes(self, sample: Sample, measured: Measurement) -> bool:
+        """Say whether a measurement's sensor is believed, without judging it."""
+        group = self._group(measured, sample)
+        return group is None or group.believes(group.sensors[measured.name])
 
     def take_back(self) -> dict[str, Matrix] | None:
         """Return particles for the belief to begin anew from, if a group that was just flagged has led it away."""
