@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from service.channels import Outlet
 from service.config import Configuration
+from service.keeper import path_of
 
 PARTICLES = 1000
 """Particles that are kept: 24 kB."""
@@ -82,11 +83,6 @@ class _File(msgspec.Struct, array_like=True):
 
 _encoder = msgspec.msgpack.Encoder()
 _decoder = msgspec.msgpack.Decoder(_File)
-
-
-def path_of(configuration: Configuration) -> Path:
-    """Return where the checkpoint of a configuration's vehicle lies."""
-    return Path(configuration.state.directory) / f"{configuration.vehicle.name}.checkpoint"
 
 
 def fingerprint(configuration: Configuration) -> str:

@@ -12,10 +12,19 @@ import select
 import signal
 import socket
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from service.config import Configuration
 
 LARGEST = 256 * 1024
 
 _log = logging.getLogger(__name__)
+
+
+def path_of(configuration: Configuration) -> Path:
+    """Return where the checkpoint of a configuration's vehicle lies."""
+    return Path(configuration.state.directory) / f"{configuration.vehicle.name}.checkpoint"
 
 
 class Keeper:

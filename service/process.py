@@ -18,15 +18,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from service import kernels
 from service.channels import Heart, Outlet, inherited
-from service.config import Budget, Configuration
 from service.journal import write_log
 from service.realtime import die_with_parent, freeze_garbage, punctual
-from service.wiring import configuration_from
 
 if TYPE_CHECKING:
     from service.checkpoint import Kept
+    from service.config import Budget, Configuration
     from service.crew import Threads
     from service.estimator import Estimator
 
@@ -57,40 +55,49 @@ def _arguments() -> argparse.ArgumentParser:
     recorder.add_argument("--recording", type=Path)
     keeper = roles.add_parser("keeper")
     keeper.add_argument("--checkpoints", type=int, required=True)
+    keeper.add_argument("--file", type=Path, required=True)
     for role in (publisher, loop, link, recorder, keeper):
         role.add_argument("--parent", type=int, required=True)
+    for role in (publisher, loop, link, recorder):
         role.add_argument("--configuration", type=int, required=True)
     return parser
 
 
-def _publisher(configuration: Configuration, arguments: argparse.Namespace) -> None:
+def _configuration(arguments: argparse.Namespace) -> Configuration:
+    from service.wiring import configuration_from
+
+    return configuration_from(arguments.configuration)
+
+
+def _publisher(arguments: argparse.Namespace) -> None:
     from service.publish.zenoh import run
 
-    run(configuration, inherited(arguments.estimates), inherited(arguments.orders))
+    run(_configuration(arguments), inherited(arguments.estimates), inherited(arguments.orders))
 
 
-def _recorder(configuration: Configuration, arguments: argparse.Namespace) -> None:
+def _recorder(arguments: argparse.Namespace) -> None:
     from service.recorder import decision_log, run, run_recording
 
     sinks = [run_recording(arguments.recording)] if arguments.recording is not None else []
     if arguments.decisions is not None:
-        sinks.append(decision_log(arguments.decisions, [link.name for link in configuration.link]))
+        sinks.append(
+            decision_log(arguments.decisions, [link.name for link in _configuration(arguments).link])
+        )
     run(sinks, inherited(arguments.records))
 
 
-def _keeper(configuration: Configuration, arguments: argparse.Namespace) -> None:
-    from service.checkpoint import path_of
+def _keeper(arguments: argparse.Namespace) -> None:
     from service.keeper import run
 
-    run(path_of(configuration), inherited(arguments.checkpoints))
+    run(arguments.file, inherited(arguments.checkpoints))
 
 
-def _link(configuration: Configuration, arguments: argparse.Namespace) -> None:
+def _link(arguments: argparse.Namespace) -> None:
     from service.link_process import LinkProcess
     from service.links import link_named
 
     signal.signal(signal.SIGTERM, _leave)
-    link = link_named(configuration, arguments.name)
+    link = link_named(_configuration(arguments), arguments.name)
     LinkProcess(arguments.name, link, inherited(arguments.samples), Heart(inherited(arguments.heart))).run()
 
 
@@ -103,8 +110,11 @@ def _leave(_signal: int, _frame: object) -> None:
     raise _Stopped
 
 
-def _loop(configuration: Configuration, arguments: argparse.Namespace) -> None:
+def _loop(arguments: argparse.Namespace) -> None:
     gc.disable()  # until it is frozen: looking for garbage among a compiler's modules is a tenth of the start
+    from service import kernels
+
+    configuration = _configuration(arguments)
     heart = Heart(inherited(arguments.heart))
     cache = kernels.warm(
         lambda name, done, count: heart.announce(f"compiling kernels, {done} of {count}: {name}")
@@ -216,7 +226,7 @@ def main() -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     write_log()
     with contextlib.suppress(_Stopped):
-        _ROLES[arguments.role](configuration_from(arguments.configuration), arguments)
+        _ROLES[arguments.role](arguments)
     # Everything is closed. Taking the interpreter apart, dialects and kernels and all, would only take
     # time that a stop within two seconds does not have on a busy machine.
     logging.shutdown()

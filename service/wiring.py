@@ -1,7 +1,7 @@
 """Which processes a configuration asks for, and how they are connected.
 
 The supervisor's plan of the real daemon: the publisher, the loop, and one process for each link, with a queue
-from each link to the loop, one from the loop to the publisher, and a heart for all that beat. Everybody reads
+from each link to the loop, one from the loop to the publisher, and a heart for all that beat. All who need it read
 the same configuration, the one that was found right, from a sealed file in memory: what happens to the file
 on disk in the meantime harms nobody.
 """
@@ -18,6 +18,7 @@ from pathlib import Path
 from service.channels import Outlet, Pair, pair
 from service.child import Program
 from service.config import Configuration, load
+from service.keeper import path_of
 
 PUBLISHER = "publisher"
 LOOP = "loop"
@@ -105,14 +106,17 @@ class Wiring:
         self._look_for_state()
 
     def programs(self) -> list[Program]:
-        """Return publisher, recorder and keeper (where there is what they need), loop and links, in this order."""
+        """Return the loop, which takes longest to start, publisher, links, recorder and keeper (where they are needed).
+
+        Whatever one of them says before another listens waits in its queue.
+        """
         names = [link.name for link in self._configuration.link]
         return [
+            self._loop(names),
             self._publisher(),
+            *(self._link(name) for name in names),
             *self._recorder(names),
             *self._keeper(),
-            self._loop(names),
-            *(self._link(name) for name in names),
         ]
 
     def call(self) -> None:
@@ -133,7 +137,9 @@ class Wiring:
         inlet, orders = self._estimates.inlet.fileno(), self._orders.outlet.fileno()
         return Program(
             PUBLISHER,
-            self._command("publisher", "--estimates", inlet, "--orders", orders),
+            self._command(
+                "publisher", "--configuration", self._file, "--estimates", inlet, "--orders", orders
+            ),
             (self._file, inlet, orders),
             self._configuration.model_dump_json(),
             environment=_single_threaded(1),
@@ -145,7 +151,7 @@ class Wiring:
         inlet = self._records.inlet.fileno()
         yield Program(
             RECORDER,
-            self._command("recorder", "--records", inlet, *self._recorded),
+            self._command("recorder", "--configuration", self._file, "--records", inlet, *self._recorded),
             (self._file, inlet),
             "\n".join(names) if "--decisions" in self._recorded else "",
             environment=_single_threaded(1),
@@ -160,12 +166,12 @@ class Wiring:
 
     def _keeper(self) -> Iterator[Program]:
         if self._keeping:
-            inlet = self._checkpoints.inlet.fileno()
+            inlet, path = self._checkpoints.inlet.fileno(), path_of(self._configuration)
             yield Program(
                 KEEPER,
-                self._command("keeper", "--checkpoints", inlet),
-                (self._file, inlet),
-                self._configuration.state.model_dump_json(),
+                self._command("keeper", "--checkpoints", inlet, "--file", path),
+                (inlet,),
+                str(path),
                 environment=_single_threaded(1),
             )
 
@@ -186,7 +192,16 @@ class Wiring:
             named += ["--checkpoints", str(queues[-1])]
         return Program(
             LOOP,
-            self._command("loop", "--heart", heart.outlet.fileno(), "--publisher", outlet, *named),
+            self._command(
+                "loop",
+                "--configuration",
+                self._file,
+                "--heart",
+                heart.outlet.fileno(),
+                "--publisher",
+                outlet,
+                *named,
+            ),
             (self._file, heart.outlet.fileno(), outlet, *ends, *queues),
             self._configuration.model_dump_json(exclude={"state"}),
             heart.inlet,
@@ -202,7 +217,9 @@ class Wiring:
         outlet = self._connection(name).outlet.fileno()
         return Program(
             f"link {name}",
-            self._command("link", "--name", name, "--heart", heart, "--samples", outlet),
+            self._command(
+                "link", "--configuration", self._file, "--name", name, "--heart", heart, "--samples", outlet
+            ),
             (self._file, heart, outlet),
             "\n".join(
                 section.model_dump_json()
@@ -214,8 +231,9 @@ class Wiring:
             environment=_single_threaded(1),
         )
 
-    def _command(self, role: str, *arguments: str | int) -> tuple[str, ...]:
-        words = (role, "--parent", os.getpid(), "--configuration", self._file, *arguments)
+    @staticmethod
+    def _command(role: str, *arguments: str | int | Path) -> tuple[str, ...]:
+        words = (role, "--parent", os.getpid(), *arguments)
         return (sys.executable, "-m", "service.process", *map(str, words))
 
     def _connection(self, name: str) -> Pair:

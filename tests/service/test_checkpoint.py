@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from service.channels import Outlet, pair
-from service.checkpoint import MAGIC, OLDEST, CheckpointError, Checkpoints, Kept, Writer, path_of, read
+from service.checkpoint import MAGIC, OLDEST, CheckpointError, Checkpoints, Kept, Writer, read
 from service.config import Configuration, validated
+from service.keeper import path_of
 
 SECOND = 1_000_000_000
 NAMES = ("north", "east", "heading")

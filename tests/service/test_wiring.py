@@ -72,9 +72,9 @@ def settings(wiring: Wiring) -> dict[str, str]:
 
 def test_one_process_for_each_link_one_loop_one_publisher(wiring: Wiring) -> None:
     programs = wiring.programs()
-    assert [program.name for program in programs] == ["publisher", "loop", "link autopilot", "link bus"]
+    assert [program.name for program in programs] == ["loop", "publisher", "link autopilot", "link bus"]
     assert [program.name for program in programs if program.vital] == ["loop"]
-    assert [program.heart is not None for program in programs] == [False, True, True, True]
+    assert [program.heart is not None for program in programs] == [True, False, True, True]
 
 
 def test_everybody_reads_the_configuration_that_was_found_right(wiring: Wiring, file: Path) -> None:
@@ -186,3 +186,8 @@ def test_a_keeper_where_there_is_a_folder_for_it_and_none_where_there_is_not(fil
         programs = {program.name: program for program in wiring.programs()}
         ends = [programs[name].command for name in ("keeper", "loop")]
         assert all("--checkpoints" in command for command in ends)
+        assert str(folder / "rover.checkpoint") in programs["keeper"].command
+        before = settings(wiring)
+        file.write_text(file.read_text().replace('name = "rover"', 'name = "boat"'))
+        wiring.reload()
+        assert settings(wiring)["keeper"] != before["keeper"]  # it writes another file now
