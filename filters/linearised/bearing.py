@@ -40,6 +40,6 @@ class LinearisedBearing:
             np.array([math.remainder(measurement.bearing, 2.0 * math.pi)]),
             expected[1:],
             jacobian[1:],
-            np.array([[sigma**2]]),
+            np.array([[sigma**2 / measurement.share]]),
             angles=(0,),
         )

@@ -41,6 +41,6 @@ class LinearisedRangeBearing:
             np.array([measurement.distance, math.remainder(measurement.bearing, 2.0 * math.pi)]),
             expected,
             jacobian,
-            np.diag(np.square(self.sensor.sigmas(measurement))),
+            np.diag(np.square(self.sensor.sigmas(measurement)) / measurement.share),
             angles=(1,),
         )

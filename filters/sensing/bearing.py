@@ -22,6 +22,7 @@ from filters.sensing.landmark import (
     checked,
     likeliest,
     log_von_mises_peak,
+    share_refusal,
 )
 from filters.sensing.robust import check, mixture, sigma_refusal
 
@@ -37,12 +38,15 @@ class BearingMeasurement(NamedTuple):
         Of the landmark, metres; ``None``: it may be any of the map.
     sigma : float or None
         Standard deviation, radians, if the measurement says so.
+    share : float
+        What it is worth, of an independent sight, 0 to 1; less where the ones before had the same errors.
     """
 
     bearing: float
     north: float | None = None
     east: float | None = None
     sigma: float | None = None
+    share: float = 1.0
 
 
 class Bearing:
@@ -75,21 +79,23 @@ class Bearing:
         return Sight(0.0, math.inf, measurement.bearing, sigma)
 
     def refusal(self, measurement: BearingMeasurement) -> str | None:
-        """Refuse a sigma that is not positive, and a landmark without a name where there is no map."""
-        return sigma_refusal(measurement.sigma) or check_association(
-            "bearing", measurement.north is not None, self.landmarks
+        """Refuse a sigma or share out of its range, and a landmark without a name where there is no map."""
+        return (
+            sigma_refusal(measurement.sigma)
+            or share_refusal(measurement.share)
+            or check_association("bearing", measurement.north is not None, self.landmarks)
         )
 
     def weigh(self, particles: ParticleSet, first: int, last: int, measurement: BearingMeasurement) -> float:
         """Add the log likelihood of a bearing; see :class:`filters.sensing.Sensor`."""
         sigma = self.sigma if measurement.sigma is None else measurement.sigma
         mixed = mixture(self.outliers, log_von_mises_peak(sigma), -math.log(CIRCLE))
-        sight = self.sight(measurement)
+        sight, share = self.sight(measurement), measurement.share
         if measurement.north is None or measurement.east is None:
-            sight.of_any(self.landmarks, particles, first, last, mixed)
+            sight.of_any(self.landmarks, particles, first, last, mixed, share)
         else:
-            sight.of(measurement.north, measurement.east, particles, first, last, mixed)
-        return mixed.log_peak
+            sight.of(measurement.north, measurement.east, particles, first, last, mixed, share)
+        return share * mixed.log_peak
 
     def place(self, pose: tuple[float, float, float], measurement: BearingMeasurement) -> tuple[float, float]:
         """Return where the landmark stands: as said, or the likeliest of the map seen from ``pose``."""

@@ -7,6 +7,11 @@ Where nobody says which landmark was seen, the association c is a nuisance, and 
 
 A particle is then judged by every landmark that could explain the reading, and none by an association that turns out
 to be wrong.
+
+Sights of one thing that follow each other repeat its errors: what hides a part of a landmark, or a robot that stands
+where none is, is there in the next picture, too. A sight that is worth only a share s of an independent one weighs
+by p(z | x)^s. A larger sigma would come to the same for one Gaussian, but would take what is no landmark for one, and
+one landmark for its neighbour.
 """
 
 from __future__ import annotations
@@ -65,6 +70,28 @@ def check_association(sensor: str, known: bool, landmarks: Float32Array) -> str 
     return f"{sensor}: a landmark that is not named needs a map to look for it in"
 
 
+class Tempered:
+    """Where a log likelihood is added up, and a ``share`` of it is taken: the log weights themselves, if that is 1."""
+
+    __slots__ = ("_block", "_particles", "_share", "log_weights")
+
+    def __init__(self, particles: ParticleSet, first: int, last: int, share: float) -> None:
+        self._particles, self._block, self._share = particles, slice(first, last), share
+        self.log_weights = particles.log_weights if share == 1.0 else np.zeros(last, np.float32)
+
+    def take(self) -> None:
+        """Add the share of what was added up to the particles' log weights."""
+        if self._share != 1.0:
+            self._particles.log_weights[self._block] += (
+                np.float32(self._share) * self.log_weights[self._block]
+            )
+
+
+def share_refusal(share: float) -> str | None:
+    """Why a sight cannot be used that says to be worth such a share."""
+    return None if 0.0 < share <= 1.0 else f"share must be in (0, 1], got {share}"
+
+
 class Sight:
     """One reading of a landmark, in the kernels' terms: the distance (gain 0 where there is none) and the bearing."""
 
@@ -77,13 +104,20 @@ class Sight:
         self.concentration = 1.0 / (sigma_bearing * sigma_bearing)
 
     def of(
-        self, north: float, east: float, particles: ParticleSet, first: int, last: int, mixed: Mixture
+        self,
+        north: float,
+        east: float,
+        particles: ParticleSet,
+        first: int,
+        last: int,
+        mixed: Mixture,
+        share: float = 1.0,
     ) -> None:
-        """Weigh particles by the landmark at (north, east)."""
-        columns, log_weights = particles.columns, particles.log_weights
+        """Weigh particles by the landmark at (north, east), by a ``share`` of what an independent sight says."""
+        tempered = Tempered(particles, first, last, share)
         sighted.direct(
-            columns,
-            log_weights,
+            particles.columns,
+            tempered.log_weights,
             first,
             last,
             north,
@@ -95,11 +129,18 @@ class Sight:
             mixed.log_inlier,
             mixed.log_outlier,
         )
+        tempered.take()
 
     def of_any(
-        self, landmarks: Float32Array, particles: ParticleSet, first: int, last: int, mixed: Mixture
+        self,
+        landmarks: Float32Array,
+        particles: ParticleSet,
+        first: int,
+        last: int,
+        mixed: Mixture,
+        share: float = 1.0,
     ) -> None:
-        """Weigh particles by all ``landmarks``, any of which it may be."""
+        """Weigh particles by all ``landmarks``, any of which it may be, by a ``share`` of an independent sight."""
         scratch = np.empty((3, last), np.float32)
         inlier = math.exp(mixed.log_inlier) / landmarks.shape[0]
         outlier = max(math.exp(max(mixed.log_outlier, -700.0)), LEAST)
@@ -107,7 +148,9 @@ class Sight:
         among.direct(
             particles.columns, first, last, landmarks, self.distance, self.gain, self.concentration, scratch
         )
-        gather.direct(particles.log_weights, first, last, scratch, inlier, outlier)
+        tempered = Tempered(particles, first, last, share)
+        gather.direct(tempered.log_weights, first, last, scratch, inlier, outlier)
+        tempered.take()
 
 
 def likeliest(landmarks: Float32Array, pose: tuple[float, float, float], sight: Sight) -> tuple[float, float]:

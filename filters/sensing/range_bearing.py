@@ -23,6 +23,7 @@ from filters.sensing.landmark import (
     checked,
     likeliest,
     log_von_mises_peak,
+    share_refusal,
 )
 from filters.sensing.robust import check, mixture, sigma_refusal
 
@@ -42,6 +43,8 @@ class RangeBearingMeasurement(NamedTuple):
         Of the landmark, metres; ``None``: it may be any of the map.
     sigma_distance, sigma_bearing : float or None
         Standard deviations, metres and radians, if the measurement says so.
+    share : float
+        What it is worth, of an independent sight, 0 to 1; less where the ones before had the same errors.
     """
 
     distance: float
@@ -50,6 +53,7 @@ class RangeBearingMeasurement(NamedTuple):
     east: float | None = None
     sigma_distance: float | None = None
     sigma_bearing: float | None = None
+    share: float = 1.0
 
 
 class RangeBearing:
@@ -102,12 +106,13 @@ class RangeBearing:
         return Sight(measurement.distance, sigma_distance, measurement.bearing, sigma_bearing)
 
     def refusal(self, measurement: RangeBearingMeasurement) -> str | None:
-        """Refuse a distance or sigma that is not positive, and a landmark without a name where there is no map."""
+        """Refuse a distance, sigma or share out of its range, and a landmark without a name where there is no map."""
         if not measurement.distance > 0.0:
             return f"distance must be positive, got {measurement.distance:g} m"
         return (
             sigma_refusal(measurement.sigma_distance)
             or sigma_refusal(measurement.sigma_bearing)
+            or share_refusal(measurement.share)
             or check_association("range_bearing", measurement.north is not None, self.landmarks)
         )
 
@@ -118,12 +123,12 @@ class RangeBearing:
         sigma_distance, sigma_bearing = self.sigmas(measurement)
         log_density = log_von_mises_peak(sigma_bearing) - math.log(sigma_distance) - _LOG_SQRT_TWO_PI
         mixed = mixture(self.outliers, log_density, -math.log(self.span * CIRCLE))
-        sight = self.sight(measurement)
+        sight, share = self.sight(measurement), measurement.share
         if measurement.north is None or measurement.east is None:
-            sight.of_any(self.landmarks, particles, first, last, mixed)
+            sight.of_any(self.landmarks, particles, first, last, mixed, share)
         else:
-            sight.of(measurement.north, measurement.east, particles, first, last, mixed)
-        return mixed.log_peak
+            sight.of(measurement.north, measurement.east, particles, first, last, mixed, share)
+        return share * mixed.log_peak
 
     def place(
         self, pose: tuple[float, float, float], measurement: RangeBearingMeasurement

@@ -99,9 +99,9 @@ class BoundSensor:
         self._last_time = -(2**62)
         self._repeats = 1.0
         self.model = self._kind.model(settings, surroundings)
-        self._log_outlier = self._kind.log_outlier_density(settings)
+        self._log_outlier = self._kind.log_outlier_density(settings, surroundings)
         given = settings.correlation_s
-        self._correlation = self._kind.correlation if given is None else given
+        self._correlation = self._kind.correlation if given is None or self._kind.tempers else given
         self._lasts = settings.kind == "position" and self._correlation > 0.0
         self._receiver = receiver_name(settings)
         self._leader: tuple[str, str] | None = None
@@ -151,6 +151,7 @@ class BoundSensor:
         outcome = self._kind.measure(self, sample.reading, place)
         if isinstance(outcome, str):
             return Refusal(name, outcome)
+        share = float(outcome.share) if self._kind.tempers else 1.0
         lasting = 0.0
         if self._lasts and isinstance(outcome, PositionMeasurement) and outcome.sigma_north:
             lasting = outcome.sigma_north**2 / self._repeats
@@ -160,11 +161,12 @@ class BoundSensor:
             outcome,
             self._kind.absolute,
             self._log_outlier,
-            self._repeats,
+            self._repeats / share,
             lasting,
-            self._correlation == 0.0,
+            self._correlation == 0.0 and not (self._kind.tempers and self.settings.correlation_s),
             TIMING if self.delay > 0 else 0.0,
             self._receiver if lasting > 0.0 and self._leads(sample) else None,
+            share,
         )
 
     def _leads(self, sample: Sample) -> bool:

@@ -82,7 +82,7 @@ class Kind:
         Makes the model's measurement of a reading, or says in a string why it cannot be one.
     default_sigma : float
         Used where neither the configuration nor the reading says how good it is.
-    spans : tuple[float, ...]
+    spans : tuple[float, ...], or a callable that says it of the surroundings
         How widely outliers scatter, one for each dimension of the reading.
     least_sigma : float
         What no reading is better than, whatever it claims.
@@ -103,6 +103,8 @@ class Kind:
         Which part of a reading a sensor takes where several may have one each: the wheel; ``None``: all of it.
     memory : callable
         Makes what is remembered of each speaker, if anything is.
+    tempers : bool
+        Whether its measurements themselves say how many of them share one independent error, by what they are of.
     alone : bool
         Whether only one speaker is heard at a time, because each has errors of its own that last.
     """
@@ -111,7 +113,7 @@ class Kind:
     model: Callable[[Sensor, Surroundings], SensorModel[Any]]
     measure: Callable[[Bound, Any, Place], Any]
     default_sigma: float
-    spans: tuple[float, ...]
+    spans: tuple[float, ...] | Callable[[Surroundings], tuple[float, ...]]
     least_sigma: float = 0.0
     correlation: float = 0.0
     absolute: bool = False
@@ -121,14 +123,16 @@ class Kind:
     label: Callable[[Sensor], str] = lambda settings: ""
     part: Callable[[Sensor], int | None] = lambda settings: None
     memory: Callable[[Sensor, Surroundings], Any] | None = None
+    tempers: bool = False
     alone: bool = False
 
-    def log_outlier_density(self, settings: Sensor) -> float:
+    def log_outlier_density(self, settings: Sensor, surroundings: Surroundings) -> float:
         """Return the logarithm of the outlier part's density in the reading's own space.
 
         A model without that part is judged as if it had a small one: nothing would ever surprise it.
         """
-        return math.log(settings.outliers or NOMINAL_OUTLIERS) - math.fsum(map(math.log, self.spans))
+        spans = self.spans(surroundings) if callable(self.spans) else self.spans
+        return math.log(settings.outliers or NOMINAL_OUTLIERS) - math.fsum(map(math.log, spans))
 
 
 class Measurement(NamedTuple):
@@ -156,6 +160,8 @@ class Measurement(NamedTuple):
         How well the latency is known that was taken off its stamp, seconds: all its readings share that error.
     receiver : str or None
         What the lasting error is named after; ``None``: of a speaker that has no state of its own.
+    share : float
+        The power of its likelihood that it weighs by, of an independent reading.
     """
 
     name: str
@@ -168,12 +174,13 @@ class Measurement(NamedTuple):
     independent: bool = False
     timing: float = 0.0
     receiver: str | None = None
+    share: float = 1.0
 
     def surprise(self, log_mean: float) -> float:
         """Return the probability, 0…1, that the reading is the outlier part's, given its evidence."""
         if math.isnan(log_mean):
             return 0.0
-        return math.exp(min(0.0, self.log_outlier - log_mean))
+        return math.exp(min(0.0, self.log_outlier - log_mean / self.share))
 
 
 class Refusal(NamedTuple):

@@ -12,10 +12,13 @@ from drivers.sample import RangeBearing as RangeBearingReading
 from filters.sensing import Bearing, BearingMeasurement, RangeBearing, RangeBearingMeasurement
 from service.config import Sensor
 from service.estimator.measuring.kind import Bound, Kind, Place, Surroundings
+from service.estimator.measuring.sightings import Sightings
 
 DEFAULT_SIGMA = 0.3
 DEFAULT_SIGMA_BEARING = 0.05
-SPAN = 50.0
+NARROWEST, WIDEST = 1.0, 50.0
+"""Metres; within these the map says how widely the distances scatter of what is no landmark."""
+
 CIRCLE = 2.0 * math.pi
 
 NOT_IN_THE_MAP = "no_landmark"
@@ -26,6 +29,13 @@ def _table(surroundings: Surroundings) -> Any:
     return np.array(list(surroundings.landmarks.values()), np.float32).reshape(-1, 2)
 
 
+def _span(surroundings: Surroundings) -> float:
+    """Return how widely distances scatter that mean nothing: what moves among the landmarks is seen as far as they."""
+    table = _table(surroundings)
+    extent = math.hypot(*np.ptp(table, axis=0)) if len(table) else WIDEST
+    return min(WIDEST, max(NARROWEST, extent))
+
+
 def _where(sensor: Bound, landmark: int | None) -> tuple[float, float] | str | None:
     """Return where the landmark stands, ``None`` if it may be any, or why the reading cannot be used."""
     if sensor.settings.association == "unknown":
@@ -33,6 +43,24 @@ def _where(sensor: Bound, landmark: int | None) -> tuple[float, float] | str | N
     if landmark is None:
         return NO_NAME
     return sensor.surroundings.landmarks.get(landmark, NOT_IN_THE_MAP)
+
+
+def _share(
+    sensor: Bound,
+    landmark: int | None,
+    place: Place,
+    sight: tuple[float | None, float],
+    sigmas: tuple[float, float],
+) -> float:
+    """Return what a sight is worth, of an independent one; of a landmark by its name only where names are believed."""
+    sightings: Sightings = sensor.memory
+    if sensor.settings.association == "known":
+        return sightings.share(place.time, landmark)
+    return sightings.share_unnamed(place.time, sight, sigmas, place.controls)
+
+
+def _sightings(settings: Sensor, _surroundings: Surroundings) -> Sightings:
+    return Sightings(settings)
 
 
 def _bearing_model(settings: Sensor, surroundings: Surroundings) -> Bearing:
@@ -46,7 +74,9 @@ def _measure_bearing(sensor: Bound, reading: BearingReading, place: Place) -> Be
     if isinstance(where, str):
         return where
     north, east = where or (None, None)
-    return BearingMeasurement(reading.bearing, north, east, sensor.spread(reading.sigma, place))
+    sigma = sensor.spread(reading.sigma, place)
+    share = _share(sensor, reading.landmark, place, (None, reading.bearing), (0.0, sigma))
+    return BearingMeasurement(reading.bearing, north, east, sigma, share)
 
 
 def _range_bearing_model(settings: Sensor, surroundings: Surroundings) -> RangeBearing:
@@ -54,7 +84,7 @@ def _range_bearing_model(settings: Sensor, surroundings: Surroundings) -> RangeB
         settings.sigma or DEFAULT_SIGMA,
         settings.sigma_bearing or DEFAULT_SIGMA_BEARING,
         outliers=settings.outliers,
-        span=SPAN,
+        span=_span(surroundings),
         landmarks=_table(surroundings),
     )
 
@@ -69,14 +99,12 @@ def _measure_range_bearing(
     bearing_sigmas = (
         sigma for sigma in (sensor.settings.sigma_bearing, reading.sigma_bearing) if sigma is not None
     )
-    return RangeBearingMeasurement(
-        reading.distance,
-        reading.bearing,
-        north,
-        east,
+    sigmas = (
         sensor.spread(reading.sigma_distance, place),
         max(bearing_sigmas, default=DEFAULT_SIGMA_BEARING),
     )
+    share = _share(sensor, reading.landmark, place, (reading.distance, reading.bearing), sigmas)
+    return RangeBearingMeasurement(reading.distance, reading.bearing, north, east, *sigmas, share)
 
 
 BEARING = Kind(
@@ -86,6 +114,8 @@ BEARING = Kind(
     default_sigma=DEFAULT_SIGMA_BEARING,
     spans=(CIRCLE,),
     absolute=True,
+    memory=_sightings,
+    tempers=True,
 )
 
 RANGE_BEARING = Kind(
@@ -93,7 +123,9 @@ RANGE_BEARING = Kind(
     _range_bearing_model,
     _measure_range_bearing,
     default_sigma=DEFAULT_SIGMA,
-    spans=(SPAN, CIRCLE),
+    spans=lambda surroundings: (_span(surroundings), CIRCLE),
     absolute=True,
     shifted=True,
+    memory=_sightings,
+    tempers=True,
 )

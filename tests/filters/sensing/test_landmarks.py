@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,7 +44,7 @@ def density(
     return result if distance is None else result * stats.norm.pdf(distance, away, sigmas[0])
 
 
-def close(got: Array, expected: Array, peak: float) -> None:
+def close(got: NDArray[np.floating[Any]], expected: Array, peak: float) -> None:
     deviations = np.sqrt(np.maximum(peak - expected, 0.0))
     assert (np.abs(got - expected) < 1e-4 + 3e-4 * deviations).all()
 
@@ -58,7 +59,7 @@ def test_a_landmarks_log_likelihood_is_the_sum_over_those_it_may_be(
     """A known landmark is a sum of one; without a name every one of the map counts equally."""
     of, sensor = particles(2), RangeBearing(*sigmas, outliers=outliers, span=40.0, landmarks=MAP)
     place = MAP[1] if known else (None, None)
-    measured = RangeBearingMeasurement(8.0, 0.7 + 4 * math.pi, *place)
+    measured = RangeBearingMeasurement(8.0, 0.7 + 4 * math.pi, place[0], place[1])
     constant = sensor.weigh(of, 0, COUNT, measured)
     candidates = MAP[1:2] if known else MAP
     inlier = sum(density(of, one, 8.0, 0.7, sigmas) for one in candidates) / len(candidates)
@@ -72,10 +73,29 @@ def test_a_landmarks_log_likelihood_is_the_sum_over_those_it_may_be(
 def test_a_bearings_log_likelihood_is_the_sum_over_those_it_may_be(known: bool) -> None:
     of, sensor = particles(3), Bearing(0.2, outliers=0.1, landmarks=MAP)
     place = MAP[3] if known else (None, None)
-    constant = sensor.weigh(of, 0, COUNT, BearingMeasurement(-2.0, *place))
+    constant = sensor.weigh(of, 0, COUNT, BearingMeasurement(-2.0, place[0], place[1]))
     candidates = MAP[3:4] if known else MAP
     inlier = sum(density(of, one, None, -2.0, (1.0, 0.2)) for one in candidates) / len(candidates)
     close(of.log_weights + constant, np.log(0.9 * inlier + 0.1 / (2.0 * math.pi)), constant)
+
+
+@pytest.mark.interpreted
+@pytest.mark.parametrize("known", [True, False])
+def test_a_sight_that_repeats_weighs_by_a_power_of_the_whole_mixture(known: bool) -> None:
+    """Not by wider errors: what no landmark explains pulls nobody, however often it is seen."""
+    of, share = particles(6), 0.2
+    of.log_weights[:COUNT] = np.linspace(-1.0, 1.0, COUNT)
+    before = of.log_weights[:COUNT].copy()
+    sensor = RangeBearing(0.3, 0.1, outliers=0.2, span=15.0, landmarks=MAP)
+    place = MAP[1] if known else (None, None)
+    constant = sensor.weigh(of, 100, 1400, RangeBearingMeasurement(8.0, 0.7, place[0], place[1], share=share))
+    candidates = MAP[1:2] if known else MAP
+    inlier = sum(density(of, one, 8.0, 0.7, (0.3, 0.1)) for one in candidates) / len(candidates)
+    expected = share * np.log(0.8 * inlier + 0.2 / (15.0 * 2.0 * math.pi))
+    gained = of.log_weights - before
+    close(gained[100:1400] + constant, expected[100:1400], constant)
+    assert (gained[:100] == 0.0).all()
+    assert (gained[1400:] == 0.0).all()
 
 
 @pytest.mark.interpreted
@@ -127,6 +147,8 @@ def test_what_cannot_be_used_is_refused_with_a_reason() -> None:
     assert "distance" in str(sensor.refusal(RangeBearingMeasurement(0.0, 0.7, 1.0, 2.0)))
     assert "sigma" in str(sensor.refusal(RangeBearingMeasurement(8.0, 0.7, 1.0, 2.0, 0.1, -0.1)))
     assert "sigma" in str(Bearing(0.1).refusal(BearingMeasurement(0.7, 1.0, 2.0, 0.0)))
+    assert "share" in str(sensor.refusal(RangeBearingMeasurement(8.0, 0.7, 1.0, 2.0, share=0.0)))
+    assert "share" in str(Bearing(0.1).refusal(BearingMeasurement(0.7, 1.0, 2.0, share=1.1)))
     assert sensor.refusal(RangeBearingMeasurement(8.0, 0.7, 1.0, 2.0)) is None
     with pytest.raises(ValueError, match="landmarks"):
         RangeBearing(0.3, 0.1, landmarks=[(1.0, math.nan)])
@@ -161,7 +183,8 @@ def test_a_filter_finds_its_place_among_landmarks(named: bool) -> None:
             + 0.1 * rng.standard_normal()
         )
         belief.predict(UnicycleControl(0.0, 0.0), 0.02)
-        belief.weigh(sensor, RangeBearingMeasurement(away, bearing, *(landmark if named else (None, None))))
+        place = landmark if named else (None, None)
+        belief.weigh(sensor, RangeBearingMeasurement(away, bearing, place[0], place[1]))
         belief.normalize()
         if belief.effective_sample_size < 4000:
             belief.resample()
