@@ -51,6 +51,7 @@ bench: install ## what this machine affords, and how the loop keeps its deadline
 	$(BIN)/python benchmarks/compare.py
 	$(BIN)/python benchmarks/saturation.py
 	$(BIN)/python benchmarks/memory.py
+	$(BIN)/python benchmarks/start.py
 	$(BIN)/python benchmarks/deadline.py --matrix
 
 system: install ## the daemon under real systemd with a real vcan0, in a guest
