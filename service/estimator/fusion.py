@@ -171,14 +171,10 @@ class Fusion:
 
     def _weigh_late(self, latecomers: Latecomers, time: int, waiting: Waiting) -> None:
         assert self.time is not None
-        measured = self._measured(time, waiting)
+        measured = self._for_particles(time, waiting)
         if measured is None:
             return
         record = self._intake.records.of(measured.name)
-        height = self._vehicle.height_for(measured.model)
-        if height is not None:
-            self._weigh_height(height, time, measured, record)
-            return
         if self.trust is not None and (self.trust.log_odds(measured.name) or 0.0) < 0.0:
             record.refused["distrusted"] += 1
             return
@@ -220,14 +216,10 @@ class Fusion:
 
     def _weigh(self, time: int, waiting: Waiting) -> None:
         """Weigh the particles by one measurement (line 5 of Table 4.3) and note what it said of the belief."""
-        measured = self._measured(time, waiting)
+        measured = self._for_particles(time, waiting)
         if measured is None:
             return
         record = self._intake.records.of(measured.name)
-        height = self._vehicle.height_for(measured.model)
-        if height is not None:
-            self._weigh_height(height, time, measured, record)
-            return
         attended = self._attention.wants(measured.name, time)
         believed = self._believed(time, waiting, measured, attended)
         self._charge(WITNESSES)
@@ -238,6 +230,15 @@ class Fusion:
             return
         self._vehicle.level(self._acting, waiting.sample.reading, self._intake.frame, measured.repeats)
         self._take_evidence(time, measured, record, attended)
+
+    def _for_particles(self, time: int, waiting: Waiting) -> Measurement | None:
+        """Return what the particles are to be weighed by; what corrects the height beside them has done so here."""
+        measured = self._measured(time, waiting)
+        height = None if measured is None else self._vehicle.height_for(measured.model)
+        if measured is None or height is None:
+            return measured
+        self._weigh_height(height, time, measured, self._intake.records.of(measured.name))
+        return None
 
     def _measured(self, time: int, waiting: Waiting) -> Measurement | None:
         """Return what was read in its model's terms; ``None``, and the reason counted, where that cannot be."""
