@@ -7,9 +7,9 @@ Pictures are SVG, compact and without a date. ``beliefd textbook`` makes those o
 
 from __future__ import annotations
 
+import argparse
 import multiprocessing
 import runpy
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from io import StringIO
 from pathlib import Path
@@ -43,4 +43,6 @@ def main(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    parser = argparse.ArgumentParser(description="Draw the figures of docs/filters/.")
+    parser.add_argument("page", nargs="*", help="without any: all")
+    main(parser.parse_args().page)
