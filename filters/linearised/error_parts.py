@@ -32,13 +32,15 @@ FRESH = ((0.4, 0.4), (0.06, 0.35), (0.01, 0.25))
 """Shares of the claimed variance that are new every second, and their probabilities while nothing was heard."""
 
 LASTING = (
-    ((0.25, 60.0), 0.25),
-    ((1.0, 60.0), 0.35),
-    ((1.0, 300.0), 0.25),
+    ((0.25, 60.0), 0.2),
+    ((1.0, 60.0), 0.3),
+    ((1.0, 300.0), 0.2),
+    ((1.0, 1500.0), 0.15),
     ((4.0, 60.0), 0.08),
     ((4.0, 300.0), 0.07),
 )
-"""Shares that last, and seconds for which they do: receivers are half to twice as good as they claim."""
+"""Shares that last, and seconds for which they do: reflections for a minute or some, the atmosphere for longer.
+Receivers are half to twice as good as they claim."""
 
 MOTION = ((1.0, 0.6), (0.1, 0.4))
 """Shares of the stated noise of the motion: it is stated with caution."""

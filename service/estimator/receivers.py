@@ -298,13 +298,16 @@ def _narrow(belief: ParticleFilter[Any]) -> bool:
 
 
 def biases_of(configuration: Configuration) -> dict[str, Bias]:
-    """Return the states of every receiver of a vehicle whose odometry tells how it moves, by the receiver's name."""
+    """Return the states of every receiver of a vehicle whose odometry tells how it moves, by the receiver's name.
+
+    One of unknown delay has none: along the way both look the same, and the particles have the delay as samples only.
+    """
     if not configuration.honesty.lasting_errors or configuration.vehicle.motion == "constant_velocity":
         return {}
     names = [
         receiver_name(sensor)
         for sensor in configuration.sensor
-        if sensor.kind == "position" and sensor.correlation_s != 0.0
+        if sensor.kind == "position" and sensor.correlation_s != 0.0 and "delay" not in sensor.estimate
     ]
     return {name: Bias(f"{name}/north", f"{name}/east") for name in names}
 

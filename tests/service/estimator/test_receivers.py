@@ -63,6 +63,7 @@ def test_only_receivers_of_a_vehicle_with_odometry_whose_errors_last_have_states
         configured(vehicle={"name": "tag", "motion": "constant_velocity"}, sensor=[{"kind": "position"}])
     )
     assert not biases_of(configured(sensor=[{"kind": "position", "correlation_s": 0.0}]))
+    assert not biases_of(configured(sensor=[{"kind": "position", "estimate": ["delay"]}]))
 
 
 def test_what_is_not_of_such_a_receiver_is_left_as_it_is() -> None:
