@@ -179,10 +179,13 @@ def test_every_option_named_exists() -> None:
             ["service", "uninstall"],
         )
     ]
-    simulator = subprocess.run(
-        [sys.executable, "-m", "sim_vehicle", "--help"], capture_output=True, text=True, check=True, cwd=ROOT
-    ).stdout
-    helps = "\n".join([*done, simulator]) + " --seeds --constraint"  # pip's
+    others = [
+        subprocess.run(
+            [sys.executable, *words, "--help"], capture_output=True, text=True, check=True, cwd=ROOT
+        ).stdout
+        for words in (["-m", "sim_vehicle"], ["benchmarks/deadline.py"])
+    ]
+    helps = "\n".join([*done, *others]) + " --seeds --constraint"  # pip's
     for page in PAGES:
         for option in set(re.findall(r"(?<![\w-])--[a-z]+(?:-[a-z]+)*", page.read_text(encoding="utf-8"))):
             assert option in helps, f"{page.name}: {option}"
