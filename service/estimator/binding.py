@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from drivers.sample import Inertial, Sample
+from drivers.sample import SECOND, Inertial, Sample
 from filters.sensing import PositionMeasurement
 from service.config import Sensor
 from service.estimator.controls import Controls
@@ -27,7 +27,6 @@ from service.estimator.measuring import (
 )
 from service.estimator.start import receiver_name
 
-SECOND = 1_000_000_000
 MAGNETIC_INTERVAL = SECOND // 5
 """A magnetometer's errors hardly change between readings: five a second carry all that it knows."""
 

@@ -20,7 +20,8 @@ from collections import deque
 from statistics import median
 from typing import NamedTuple, Protocol
 
-from service.estimator.track import SECOND, Motion
+from drivers.sample import SECOND
+from service.estimator.track import Motion
 
 DEGREES = 4.0
 """Of freedom: one error in 2,000 lies beyond ten scales."""

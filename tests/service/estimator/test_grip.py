@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from drivers.sample import SECOND
 from service.estimator.grip import NOTHING, Grip, Said
-from service.estimator.track import SECOND, Motion
+from service.estimator.track import Motion
 
 STEP = SECOND // 10
 SLIP = 0.2
