@@ -6,7 +6,7 @@ vehicle is; the particles are drawn there.
 
 In flight an :class:`~service.estimator.alarm.Alarm` follows the evidence. Where every kind of absolute sensor asks for
 most of the particles anew, a quest runs beside the belief, over ticks. What it finds is a
-:class:`~service.estimator.rival.Rival`, not yet the belief: first it must predict what comes next, far better than that.
+:class:`~service.estimator.rival.Rival`, not yet the belief: first it must predict what comes next, far better than it.
 """
 
 from __future__ import annotations
