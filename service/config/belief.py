@@ -199,7 +199,8 @@ class Sensor(Section):
 
     Default: 1 for position, velocity, heading and altitude, 0.2 for speed, 0 (every reading counts for itself) for all
     others. Of a position
-    above 0, the part of its error that lasts for a minute is added to what is published. Of landmarks it counts for
+    above 0, what lasts of its error for minutes is learned, or (without odometry, or with an
+    unknown delay) added to what is published. Of landmarks it counts for
     each thing seen; without names, for what is seen where the thing seen before is expected."""
     bias_sigma: NotNegative | None = None
     """What an estimated bias may be at the start, in the reading's unit (one standard deviation).

@@ -1,6 +1,7 @@
 """Widens what is published by what a receiver's lasting error may have done to the belief (:mod:`filters.consider`).
 
-The particles weigh fixes as if their errors were new every second. Published is, beside the particles' own spread, the
+Where the lasting error is no state of the particles (:mod:`service.estimator.receivers`), they weigh fixes as if their
+errors were new every second. Published is, beside the particles' own spread, the
 share of the mean that the receiver's error of the last minute has, reckoned along with every absolute measurement.
 
 A latency that was stated lasts longer still: it is not known better than to some hundredths of a second, and shifts all
