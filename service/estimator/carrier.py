@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from filters.belief import Displacement, Moments
+from filters.density.gaussian import radius
 from service.estimate import Triangle, Triple
 
 
@@ -43,6 +45,16 @@ class Pose(NamedTuple):
     def mean(self, name: str) -> float:
         """Return the mean of one column."""
         return float(self.moments.mean[self.moments.names.index(name)])
+
+    def wider(self, added: NDArray[np.float64]) -> Pose:
+        """Return it with the covariance of the place, (2, 2), larger by ``added``, and the radius with it."""
+        own = radius(self.covariance[:2, :2], 0.95)
+        covariance = self.covariance.copy()
+        covariance[:2, :2] += added
+        wider = radius(covariance[:2, :2], 0.95)
+        # with several hypotheses the radius is larger than the covariance alone would have it
+        beyond = math.sqrt(max(0.0, wider * wider - own * own + self.radius95 * self.radius95))
+        return self._replace(covariance=covariance, radius95=beyond)
 
 
 class Carrier(Protocol):

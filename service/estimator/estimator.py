@@ -133,7 +133,13 @@ class Estimator:
             self._fusion.companions.append(receivers)
         lasting = Lasting(receivers)
         self._fusion.companions.append(lasting)
-        self._output = Output(self._vehicle, self._filter, self._tracker, lasting)
+        self._output = Output(
+            self._vehicle,
+            self._filter,
+            self._tracker,
+            lasting,
+            None if self._trust is None else self._trust.dispute,
+        )
         self._sequence = 0
         self._freely = Course()
         self._told: Start | None = None

@@ -284,11 +284,13 @@ class Fusion:
                     companion.started(time)
         return believed
 
-    def _worth(self, measured: Measurement) -> Measurement:
+    def _worth(self, time: int, measured: Measurement) -> Measurement:
         """Return a measurement as the belief is to be weighed by it."""
         if self.receivers is not None and self.receivers.knows(measured) and not self._deputised:
-            return self.receivers.split(measured)
-        return measured if self.caution is None else self.caution.sized(measured)
+            worth = self.receivers.split(measured)
+        else:
+            worth = measured if self.caution is None else self.caution.sized(measured)
+        return worth if self.trust is None else self.trust.dispute.sized(time, worth)
 
     def _take_evidence(self, time: int, measured: Measurement, record: SensorRecord, attended: bool) -> None:
         if self.search is not None and self.search.blind:
@@ -296,7 +298,7 @@ class Fusion:
             record.accepted += 1
             record.last = time
             return
-        worth = self._worth(measured)
+        worth = self._worth(time, measured)
         evidence = self._acting.weigh(worth.model, worth.value)
         if not evidence.accepted:
             record.refused["invalid"] += 1

@@ -10,6 +10,7 @@ from filters.motion.constant_velocity import DOWN, VELOCITY_DOWN, VELOCITY_EAST,
 from filters.particle import ParticleFilter
 from service.estimate import Estimate, Hypotheses, Triangle, Triple
 from service.estimator.carrier import Pose
+from service.estimator.dispute import Dispute
 from service.estimator.hypotheses import Tracker
 from service.estimator.lasting import Lasting
 from service.estimator.leading import Leading
@@ -37,11 +38,13 @@ class Output:
         belief: ParticleFilter[Any],
         tracker: Tracker | None = None,
         lasting: Lasting | None = None,
+        dispute: Dispute | None = None,
     ) -> None:
         self._vehicle = vehicle
         self._belief = belief
         self._tracker = tracker
         self._lasting = lasting
+        self._dispute = dispute
         self._pose: Pose | None = None
         self._leading = None if tracker is None else Leading(belief, tracker)
         self._carrier = vehicle.carrier(belief if self._leading is None else self._leading)
@@ -58,6 +61,8 @@ class Output:
             pose = self._leading.honest(pose, self._carrier.displacement)
         if self._lasting is not None:
             pose = self._lasting.widened(pose)
+        if self._dispute is not None and self._dispute.held.any():
+            pose = pose.wider(self._dispute.held)
         self._pose = pose
         return pose
 

@@ -34,6 +34,7 @@ from filters.regularization import root
 from filters.sensing import Heading, Position, Range, Velocity
 from filters.sensing.speed import WheelSpeed
 from service.config import Configuration
+from service.estimator.dispute import Dispute
 from service.estimator.lie import Lie
 from service.estimator.measuring import Measurement
 from service.estimator.vehicle import Vehicle
@@ -235,6 +236,7 @@ class Trust:
         control: Callable[[int, int], UnicycleControl],
         seed: int,
     ) -> None:
+        self.dispute = Dispute()
         self._undo: tuple[Matrix, Matrix] | None = None
         self._seed = seed
         self._taken_back = 0
@@ -265,8 +267,8 @@ class Trust:
     def decides(self) -> bool:
         """Whether it is one alone that disagrees, which once agreed and has a witness.
 
-        It is when nobody else says where the vehicle is, or when its witness takes its readings for wild and not those
-        of the others. No search is to follow it then: it may be a lie, and that is decided here. A vehicle that was
+        It is when it is under suspicion and nobody else says where the vehicle is, or when its witness takes its
+        readings for wild and not those of the others. No search is to follow it then: it may be a lie, and that is decided here. A vehicle that was
         carried away has all witnesses wrong, so a search is held back for as long as it takes them to notice: ten
         readings of the others.
         """
@@ -274,9 +276,22 @@ class Trust:
         return any(
             group.agreed
             and self._witnesses.judging(group.place) is not None
-            and (len(placed) == 1 or self._alone(group))
+            and (self._alone(group) if len(placed) > 1 else self._suspected(group))
             for group in placed
         )
+
+    def _suspected(self, group: Group) -> bool:
+        """Say whether one of a group that says where the vehicle is has been caught, or may soon be."""
+        odds = self._odds.log_odds
+        return any(sensor.absolute and odds[sensor.place] < CALM for sensor in group.sensors.values())
+
+    def _dispute(self, group: Group, sensor: Judged) -> None:
+        """Note where the belief is away from what an older witness of a receiver says."""
+        member = self._witnesses.judging(group.place)
+        if member is not None:
+            mean, covariance = self._witnesses.gaussian(member)
+            here = self._belief.moments().mean[:2]
+            self.dispute.hear(here - mean[:2], sensor.level.caution * covariance[:2, :2])
 
     def _alone(self, group: Group) -> bool:
         """Say whether a group contradicts what all others say, and they do not contradict each other."""
@@ -304,6 +319,7 @@ class Trust:
         """Move the witnesses, and have new ones begin when it is time."""
         self._time = end
         self._witnesses.move(self._control(start, end), (end - start) / SECOND)
+        self.dispute.wait((end - start) / SECOND)
         if end < self._due:
             return
         following = [(self._following(group), group) for group in self._groups.values() if not group.flagged]
@@ -351,6 +367,8 @@ class Trust:
             sensor.compare(opinion, weight)
             self._judge(group, sensor, opinion, next(iter(said.values())).testimony, weight)
             group.lie.hear(time, opinion.testimony, weight, sensor.absolute)
+            if sensor.absolute and not sensor.ranging and not sensor.flagged:
+                self._dispute(group, sensor)
         return group.believes(sensor)
 
     def believes(self, sample: Sample, measured: Measurement) -> bool:
@@ -418,6 +436,7 @@ class Trust:
             sensor.lessons.clear()
             group.lie.begin()
             if sensor.absolute:
+                self.dispute.settle()
                 self._look_back(group, sensor.level.caution)
 
     def _accuses(self, group: Group) -> bool:

@@ -1,0 +1,81 @@
+"""What a receiver and the way disagree about, until it is decided who is right.
+
+A receiver may be led away slowly, or stand in reflections for a minute, and claim centimetres all the same: the belief
+follows it. Its witness (:class:`~service.estimator.witnesses.Witnesses`) knows where the vehicle would be without it.
+Of two estimates of which one uses more than the other the difference d has at most the covariance S of the one that
+uses less (Hausman, "Specification tests in econometrics", 1978), so ``q = d' S^-1 d`` is chi-square where both are right.
+Where it is beyond that, one of them is wrong, and until the judge (:mod:`service.estimator.trust`) has decided which,
+
+- nobody knows where the vehicle is better than to d: published is ``(1 - T / q) (d d' + S)`` more,
+- the receiver's fixes are weighed as ones whose errors last and are that large: the belief goes by the way.
+
+The judge is patient, because reflections of 5 m are nobody's lie. This is what keeps the belief honest meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from drivers.sample import SECOND
+from filters.kalman import Matrix
+from filters.sensing import PositionMeasurement
+from service.estimator.measuring import Measurement
+
+USUAL = 9.2
+"""T: in two dimensions q is larger once in a hundred times."""
+
+LASTING = 60.0
+"""Seconds for which a receiver's error stays alike."""
+
+MEMORY = 120.0
+"""Seconds after which a variance is down to 1 / e: a receiver that was off by so much may be so again, and a witness
+that began since knows nothing of it."""
+
+
+class Dispute:
+    """What is left of the disagreements of the last minutes, as a covariance of the place, (2, 2) square metres."""
+
+    def __init__(self) -> None:
+        self.held: Matrix = np.zeros((2, 2))
+        self._heard: dict[str, int] = {}
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass."""
+        self.held *= math.exp(-seconds / MEMORY)
+
+    def settle(self) -> None:
+        """Forget it: who was wrong has been decided."""
+        self.held[:] = 0.0
+
+    def hear(self, away: Matrix, spread: Matrix) -> None:
+        """Take a disagreement in, where it is larger than what is held.
+
+        Parameters
+        ----------
+        away : (2,) float64
+            Difference of two estimates, metres.
+        spread : (2, 2) float64
+            Covariance of the one that uses less, square metres.
+        """
+        square = float(away @ np.linalg.solve(spread, away))
+        if square <= USUAL:
+            return
+        share = 1.0 - USUAL / square
+        if share * float(away @ away) > float(np.trace(self.held)):
+            self.held = share * (np.outer(away, away) + spread)
+
+    def sized(self, time: int, measured: Measurement) -> Measurement:
+        """Return a fix with the variance of a reading whose error lasts, as far as its receiver is disputed."""
+        value = measured.value
+        if not isinstance(value, PositionMeasurement) or not value.sigma_north:
+            return measured
+        elapsed = min(1.0, max(0.01, (time - self._heard.get(measured.name, 0)) / SECOND))
+        self._heard[measured.name] = time
+        if not self.held.any():
+            return measured
+        added = 0.5 * float(np.trace(self.held)) * LASTING / elapsed
+        north = math.sqrt(value.sigma_north**2 + added)
+        east = None if value.sigma_east is None else math.sqrt(value.sigma_east**2 + added)
+        return measured._replace(value=value._replace(sigma_north=north, sigma_east=east))
