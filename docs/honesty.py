@@ -27,7 +27,7 @@ CALIBRATION = ("<!-- calibration: begin -->", "<!-- calibration: end -->")
 CHECKS = ("<!-- checks: begin -->", "<!-- checks: end -->")
 ABLATION = ("<!-- ablation: begin -->", "<!-- ablation: end -->")
 SCENARIOS = ("beacons", "mirror", "kidnap", "late_fix", "spoof", "multipath", "slip", "jam", "outage")
-SWITCHES = ("hypotheses", "recovery", "trust", "motion_mode", "noise_learning")
+SWITCHES = ("hypotheses", "recovery", "trust", "motion_mode", "noise_learning", "lasting_errors")
 LIED_TO = ("kidnap",)
 """Scenarios whose start is a lie told with certainty: no belief can be right until the evidence comes."""
 
