@@ -268,9 +268,9 @@ class Trust:
         """Whether it is one alone that disagrees, which once agreed and has a witness.
 
         It is when it is under suspicion and nobody else says where the vehicle is, or when its witness takes its
-        readings for wild and not those of the others. No search is to follow it then: it may be a lie, and that is decided here. A vehicle that was
-        carried away has all witnesses wrong, so a search is held back for as long as it takes them to notice: ten
-        readings of the others.
+        readings for wild and not those of the others. No search is to follow it then: it may be a lie, and that is
+        decided here. A vehicle that was carried away has all witnesses wrong, so a search is held back for as long as
+        it takes them to notice: ten readings of the others.
         """
         placed = [group for group in self._groups.values() if group.absolute and self._recent(group)]
         return any(
