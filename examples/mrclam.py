@@ -58,7 +58,7 @@ outliers = 0.05
 sigma = 0.25                      # so narrow that neighbours, and robots, are told from a landmark
 sigma_bearing = 0.03
 correlation_s = 2.0               # the rest of what repeats: a thing seen again within 2 s is hardly a new witness
-outliers = 0.2                    # robots
+outliers = 0.4                    # robots: a fifth of all sights, and half of those of the first 110 s
 """,
 }
 """Of sights with names, and of those that may be of any landmark or none: the latter chosen on the first 300 s."""
