@@ -4,7 +4,8 @@ A receiver may be led away slowly, or stand in reflections for a minute, and cla
 follows it. Its witness (:class:`~service.estimator.witnesses.Witnesses`) knows where the vehicle would be without it.
 Of two estimates of which one uses more than the other the difference d has at most the covariance S of the one that
 uses less (Hausman, "Specification tests in econometrics", 1978), so ``q = d' S^-1 d`` is chi-square where both are
-right. Where it is beyond that, one of them is wrong, and until the judge (:mod:`service.estimator.trust`) has decided which,
+right. Where it is beyond that, one of them is wrong, and until the judge (:mod:`service.estimator.trust`) has decided
+which,
 
 - nobody knows where the vehicle is better than to d: published is ``(1 - T / q) (d d' + S)`` more,
 - the receiver's fixes are weighed as ones whose errors last and are that large: the belief goes by the way.
