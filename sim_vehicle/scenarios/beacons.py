@@ -61,5 +61,12 @@ def draw(seed: int) -> Scenario:
             outlier_mean=4.0,
         ),
         facts=(SensorFacts("range", "autopilot", sigma=RANGE_SIGMA, outliers=0.02),),
-        motion={"gyro_bias_walk": 1e-4, "gyro_bias_sigma": 0.006, "odometry_scale_sigma": 0.02},
+        motion={
+            # slip of 3 % for a second at a time, and now and then a burst, at the yard's 1 to 2 m/s
+            "speed_noise": 0.06,
+            "slip_noise": 0.02,
+            "gyro_bias_walk": 1e-4,
+            "gyro_bias_sigma": 0.006,
+            "odometry_scale_sigma": 0.02,
+        },
     )
