@@ -83,11 +83,14 @@ class HealthMonitor:
     _last_kind: str = ""
     _placed: bool = field(default=False)
 
-    def measured(self, now: int, kind: str, surprise: float) -> None:
-        """Note one absolute measurement: ``surprise`` is the probability, 0…1, that it is the outlier part's."""
+    def measured(self, now: int, kind: str, surprise: float, worth: float = 1.0) -> None:
+        """Note one absolute measurement: ``surprise`` is the probability, 0…1, that it is the outlier part's.
+
+        One that tells what those before it told is ``worth`` the less, 0…1: an outlier seen ten times is one.
+        """
         self._readings += 1
         elapsed = 0.0 if self._last_reading is None else max(0.0, (now - self._last_reading) / SECOND)
-        share = min(1.0, max(1.0 / self._readings, elapsed / MEMORY + 0.02))
+        share = worth * min(1.0, max(1.0 / self._readings, elapsed / MEMORY + 0.02))
         self._surprise += share * (surprise - self._surprise)
         self._last_reading = now
         self._last_kind = kind

@@ -2,8 +2,9 @@
 
 A jump is either done on purpose (the belief begins anew where a search, an order or a witness says; another hypothesis
 leads) or seen in what is published: within about a second the position has moved by more than :data:`FAR` beyond what
-its own velocity says, as when a receiver is back after minutes of dead reckoning. What moves in the wake of a jump
-belongs to it. A belief that had no place yet does not jump when it finds one.
+its own velocity says, as when a receiver is back after minutes of dead reckoning. While it tracks it may go as far as
+it said that it may be off: that is what a fix is for. What moves in the wake of a jump belongs to it. A belief that had
+no place yet does not jump when it finds one.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ class Jumps:
         self._last = -(2**62)
         self._before: Estimate | None = None
         self._north = self._east = 0.0
+        self._untracked = -(2**62)
 
     def done(self, now: int) -> None:
         """Count a jump that was done on purpose at ``now`` (nanoseconds)."""
@@ -61,7 +63,10 @@ class Jumps:
         kept = math.exp(-(estimate.monotonic_ns - before.monotonic_ns) / SECOND / FADING)
         self._north = kept * self._north + offset[0]
         self._east = kept * self._east + offset[1]
-        if math.hypot(self._north, self._east) > FAR:
+        if before.health is not HealthState.TRACKING:
+            self._untracked = before.monotonic_ns
+        tracks = before.monotonic_ns - self._untracked > WAKE
+        if math.hypot(self._north, self._east) > (max(FAR, before.radius95 or 0.0) if tracks else FAR):
             if estimate.monotonic_ns - self._last > WAKE:
                 self._step(estimate.monotonic_ns)
             self._north = self._east = 0.0

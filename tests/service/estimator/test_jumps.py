@@ -57,6 +57,23 @@ def test_a_move_of_12_m_in_less_than_half_a_second_is_one_jump(ticks: int) -> No
     assert steps[50 + ticks :] == [1] * (250 - ticks)
 
 
+def test_a_belief_that_tracks_may_go_as_far_as_it_said_and_one_that_reckoned_may_not() -> None:
+    """12 m under a region of 20: a fix is for that; after dead reckoning it is the end of that, and a jump."""
+    for health, expected in ((HealthState.TRACKING, 0), (HealthState.DEAD_RECKONING, 1)):
+        jumps = Jumps()
+        for k in range(300):
+            jumps.spoken(
+                msgspec.structs.replace(
+                    BEFORE,
+                    monotonic_ns=k * TICK,
+                    position=(0.2 * k + 12.0 * (k > 200), 0.0, None),
+                    radius95=20.0,
+                    health=health if k <= 200 else HealthState.TRACKING,
+                )
+            )
+        assert jumps.steps == expected
+
+
 def test_a_slow_drift_back_is_none() -> None:
     """10 m in 10 s: 1 m/s beyond the velocity adds up to 1 m within the second that is remembered."""
     jumps = Jumps()
