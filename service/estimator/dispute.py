@@ -21,7 +21,7 @@ import numpy as np
 
 from drivers.sample import SECOND
 from filters.kalman import Matrix
-from filters.sensing import PositionMeasurement
+from filters.sensing import PositionMeasurement, VelocityMeasurement
 from service.estimator.measuring import Measurement
 
 USUAL = 9.2
@@ -29,6 +29,9 @@ USUAL = 9.2
 
 LASTING = 60.0
 """Seconds for which a receiver's error stays alike."""
+
+PACE = 10.0
+"""Seconds in which a receiver may have gone as far away as it is disputed: so fast may its velocity lie."""
 
 MEMORY = 120.0
 """Seconds after which a variance is down to 1 / e: a receiver that was off by so much may be so again, and a witness
@@ -68,15 +71,21 @@ class Dispute:
             self.held = share * (np.outer(away, away) + spread)
 
     def sized(self, time: int, measured: Measurement) -> Measurement:
-        """Return a fix with the variance of a reading whose error lasts, as far as its receiver is disputed."""
+        """Return a receiver's reading with the variance of one whose error lasts, as far as the receiver is disputed."""
         value = measured.value
-        if not isinstance(value, PositionMeasurement) or not value.sigma_north:
+        if not isinstance(value, PositionMeasurement | VelocityMeasurement):
             return measured
         elapsed = min(1.0, max(0.01, (time - self._heard.get(measured.name, 0)) / SECOND))
         self._heard[measured.name] = time
         if not self.held.any():
             return measured
         added = 0.5 * float(np.trace(self.held)) * LASTING / elapsed
-        north = math.sqrt(value.sigma_north**2 + added)
-        east = None if value.sigma_east is None else math.sqrt(value.sigma_east**2 + added)
+        if isinstance(value, VelocityMeasurement):
+            return measured._replace(value=value._replace(sigma=_wider(value.sigma, added / PACE**2)))
+        north, east = _wider(value.sigma_north, added), _wider(value.sigma_east, added)
         return measured._replace(value=value._replace(sigma_north=north, sigma_east=east))
+
+
+def _wider(sigma: float | None, added: float) -> float | None:
+    """Return a standard deviation with a variance more; what the reading does not say the model knows."""
+    return None if sigma is None else math.sqrt(sigma * sigma + added)

@@ -49,6 +49,9 @@ from service.health import Facts, HealthMonitor
 START_COUNT = 10_000
 """Particles of a start about a known place; one over an area takes all that can be afforded."""
 
+PATIENCE = 20 * SECOND
+"""A search waits so long for the judge of a lone receiver, who needs two to three seconds for a great lie."""
+
 C = TypeVar("C", bound=Companion)
 
 
@@ -140,6 +143,8 @@ class Estimator:
             lasting,
             None if self._trust is None else self._trust.dispute,
         )
+        self._left_since: int | None = None
+        self._left_at = 0
         self._sequence = 0
         self._freely = Course()
         self._told: Start | None = None
@@ -282,10 +287,8 @@ class Estimator:
     def _find(self, now: int, afforded: int) -> None:
         """Let the search for the place go on, and begin anew where it has found one."""
         assert self._fusion.time is not None
-        if self._search.idle:
-            return
         blind = self._search.blind
-        if not blind and self._trust is not None and self._trust.decides:
+        if self._search.idle or (not blind and self._left_to_trust(self._fusion.time)):
             return
         self._search.work(self._fusion.time)
         found = self._search.found(self._fusion.time, self._population.clamp(START_COUNT, afforded))
@@ -298,13 +301,24 @@ class Estimator:
                 self._jumps.done(now)
         self._stopwatch.lap("search")
 
+    def _left_to_trust(self, time: int) -> bool:
+        """Say whether what sets the search off may be a lie; not for ever, if the judge of that sees none."""
+        trust = self._trust
+        if trust is None or not trust.decides:
+            self._left_since = None
+            return False
+        if self._left_since is None or time - self._left_at > SECOND:
+            self._left_since = time
+        self._left_at = time
+        return trust.suspects or time - self._left_since < PATIENCE
+
     def _look(self, now: int) -> None:
-        """Ask for the hypotheses; while there are several nobody is a witness, for he would be of one of them."""
+        """Ask for the hypotheses; while there are several nobody becomes a witness, for he would be of one of them."""
         if self._tracker is None:
             return
         self._tracker.look(now)
-        if self._tracker.count > 1 and self._trust is not None and self._fusion.time is not None:
-            self._trust.started(self._fusion.time)
+        if self._trust is not None:
+            self._trust.divided = self._tracker.count > 1
         self._stopwatch.lap("extraction")
 
     # --- estimates out ------------------------------------------------------------------------------------------

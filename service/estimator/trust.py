@@ -237,6 +237,7 @@ class Trust:
         seed: int,
     ) -> None:
         self.dispute = Dispute()
+        self.divided = False
         self._undo: tuple[Matrix, Matrix] | None = None
         self._seed = seed
         self._taken_back = 0
@@ -267,8 +268,8 @@ class Trust:
     def decides(self) -> bool:
         """Whether it is one alone that disagrees, which once agreed and has a witness.
 
-        It is when it is under suspicion and nobody else says where the vehicle is, or when its witness takes its
-        readings for wild and not those of the others. No search is to follow it then: it may be a lie, and that is
+        It is when nobody else says where the vehicle is, or when its witness takes its readings for wild and not those
+        of the others. No search is to follow it then: it may be a lie, and that is
         decided here. A vehicle that was carried away has all witnesses wrong, so a search is held back for as long as
         it takes them to notice: ten readings of the others.
         """
@@ -276,14 +277,16 @@ class Trust:
         return any(
             group.agreed
             and self._witnesses.judging(group.place) is not None
-            and (self._alone(group) if len(placed) > 1 else self._suspected(group))
+            and (len(placed) == 1 or self._alone(group))
             for group in placed
         )
 
-    def _suspected(self, group: Group) -> bool:
-        """Say whether one of a group that says where the vehicle is has been caught, or may soon be."""
+    @property
+    def suspects(self) -> bool:
+        """Whether somebody who says where the vehicle is has been caught, or may soon be."""
         odds = self._odds.log_odds
-        return any(sensor.absolute and odds[sensor.place] < CALM for sensor in group.sensors.values())
+        sensors = [sensor for group in self._groups.values() for sensor in group.sensors.values()]
+        return any(sensor.absolute and odds[sensor.place] < CALM for sensor in sensors)
 
     def _dispute(self, group: Group, sensor: Judged) -> None:
         """Note where the belief is away from what an older witness of a receiver says."""
@@ -472,6 +475,8 @@ class Trust:
 
     def _begin(self, groups: list[Group]) -> None:
         moments = self._belief.moments()
+        if self.divided:
+            return
         if float(moments.variance[2]) > NARROW**2 or float(moments.variance[:2].sum()) > 2.0 * PLACED**2:
             return
         gaussian = gaussian_of(self._belief, self._motion.conditional_variances)
