@@ -39,9 +39,18 @@ that began since knows nothing of it."""
 
 
 class Dispute:
-    """What is left of the disagreements of the last minutes, as a covariance of the place, (2, 2) square metres."""
+    """What is left of the disagreements of the last minutes.
+
+    Attributes
+    ----------
+    held : (2, 2) float64
+        As a covariance of the place, square metres.
+    variance : float
+        Of the belief, m² per axis: where it knows less than the receiver may be off by, it takes a fix for that.
+    """
 
     def __init__(self) -> None:
+        self.variance = 0.0
         self.held: Matrix = np.zeros((2, 2))
         self._heard: dict[str, int] = {}
 
@@ -71,7 +80,7 @@ class Dispute:
             self.held = share * (np.outer(away, away) + spread)
 
     def sized(self, time: int, measured: Measurement) -> Measurement:
-        """Return a receiver's reading with the variance of one whose error lasts, as far as the receiver is disputed."""
+        """Return a receiver's reading with the variance of one whose error lasts, as far as it is disputed."""
         value = measured.value
         if not isinstance(value, PositionMeasurement | VelocityMeasurement):
             return measured
@@ -79,7 +88,10 @@ class Dispute:
         self._heard[measured.name] = time
         if not self.held.any():
             return measured
-        added = 0.5 * float(np.trace(self.held)) * LASTING / elapsed
+        lasting = 0.5 * float(np.trace(self.held))
+        added = lasting * LASTING / elapsed
+        if self.variance > lasting:
+            added = min(added, lasting * self.variance / (self.variance - lasting))
         if isinstance(value, VelocityMeasurement):
             return measured._replace(value=value._replace(sigma=_wider(value.sigma, added / PACE**2)))
         north, east = _wider(value.sigma_north, added), _wider(value.sigma_east, added)

@@ -92,6 +92,12 @@ WILD_SHARE = 0.4
 POISONED = 9.2
 """Squared distance of the belief from the witness, in the witness's own measure, above which it was led away (99 %)."""
 
+LEAST_CAUTION = 0.25
+"""A witness is not taken to be better than twice what it says, in standard deviations, before it disputes a fix."""
+
+STRAYED = 0.2
+"""Radians that nobody measured, from which on a witness has lost his way: where he is then is no ellipse any more."""
+
 NARROW, PLACED = 0.35, 5.0
 """Radians and metres: a belief with less spread than this is one place, and makes a witness."""
 
@@ -238,6 +244,8 @@ class Trust:
     ) -> None:
         self.dispute = Dispute()
         self.divided = False
+        self._turned = 0.0
+        self._strayed = -(2**62)
         self._undo: tuple[Matrix, Matrix] | None = None
         self._seed = seed
         self._taken_back = 0
@@ -289,12 +297,15 @@ class Trust:
         return any(sensor.absolute and odds[sensor.place] < CALM for sensor in sensors)
 
     def _dispute(self, group: Group, sensor: Judged) -> None:
-        """Note where the belief is away from what an older witness of a receiver says."""
+        """Note where the belief is away from what an older witness of a receiver says, if he has not lost his way."""
+        moments = self._belief.moments()
+        self.dispute.variance = 0.5 * float(moments.variance[0] + moments.variance[1])
         member = self._witnesses.judging(group.place)
-        if member is not None:
-            mean, covariance = self._witnesses.gaussian(member)
-            here = self._belief.moments().mean[:2]
-            self.dispute.hear(here - mean[:2], sensor.level.caution * covariance[:2, :2])
+        if member is None or self._witnesses.began(member) <= self._strayed or not self._accuses(group):
+            return
+        mean, covariance = self._witnesses.gaussian(member)
+        spread = max(LEAST_CAUTION, sensor.level.caution) * covariance[:2, :2]
+        self.dispute.hear(moments.mean[:2] - mean[:2], spread)
 
     def _alone(self, group: Group) -> bool:
         """Say whether a group contradicts what all others say, and they do not contradict each other."""
@@ -321,8 +332,12 @@ class Trust:
     def moved(self, start: int, end: int) -> None:
         """Move the witnesses, and have new ones begin when it is time."""
         self._time = end
-        self._witnesses.move(self._control(start, end), (end - start) / SECOND)
+        control = self._control(start, end)
+        self._witnesses.move(control, (end - start) / SECOND)
         self.dispute.wait((end - start) / SECOND)
+        self._turned = self._turned + control.turn_sigma**2 if control.turn_sigma > 0.0 else 0.0
+        if self._turned > STRAYED**2:
+            self._strayed = end
         if end < self._due:
             return
         following = [(self._following(group), group) for group in self._groups.values() if not group.flagged]

@@ -158,7 +158,7 @@ class Witnesses:
     def begin(self, groups: Sequence[int], time: int, mean: Matrix, covariance: Matrix) -> None:
         """Have a witness of each group begin at ``time`` with this Gaussian, in the place of the older one."""
         self._expected = None
-        members = [min(self._slots(group), key=self._beginning_of) for group in groups]
+        members = [min(self._slots(group), key=self.began) for group in groups]
         self.bank.set_some(members, mean, covariance)
         self._contradiction[members] = self._wildness[members] = 0.0
         for member in members:
@@ -168,7 +168,7 @@ class Witnesses:
     def _slots(group: int) -> range:
         return range(SLOTS * group, SLOTS * (group + 1))
 
-    def _beginning_of(self, member: int) -> int:
+    def began(self, member: int) -> int:
         """Return when a witness began; of a free place, before any."""
         return self._began[member] if self.bank.live[member] else -(2**62)
 

@@ -69,6 +69,21 @@ def test_the_fixes_of_a_minute_weigh_as_one_whose_error_is_what_is_in_dispute(ra
     assert 1.0 / information == pytest.approx(0.5 * np.trace(dispute.held), rel=0.02)
 
 
+def test_a_belief_that_knows_less_takes_a_fix_and_ends_as_uncertain_as_the_receiver_is_disputed() -> None:
+    """Fix by fix in a Kalman filter of one axis: the variance comes down to what is held, and no lower."""
+    dispute = Dispute()
+    dispute.hear(np.array([30.0, 0.0]), np.eye(2))
+    lasting = 0.5 * float(np.trace(dispute.held))
+    variance = 100.0 * lasting
+    for index in range(10):
+        dispute.variance = variance
+        value = dispute.sized((1 + index) * SECOND // 5, fix(0.01)).value
+        assert isinstance(value, PositionMeasurement)
+        assert value.sigma_north is not None
+        variance = 1.0 / (1.0 / variance + 1.0 / value.sigma_north**2)
+        assert 0.95 * lasting <= variance <= 1.01 * lasting
+
+
 def test_what_is_not_disputed_and_what_is_no_fix_stays_as_it_is() -> None:
     dispute = Dispute()
     honest = fix(0.3)
