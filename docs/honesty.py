@@ -110,14 +110,14 @@ def draw(kept: dict[str, Any]) -> None:
         "axes.spines.right": False,
     }
     with mpl.rc_context({**look, "axes.grid": True, "grid.color": "#e6e6e6", "axes.axisbelow": True}):
-        figure = Figure(figsize=(9.6, 5.2), layout="constrained")
+        figure = Figure(figsize=(9.6, 5.8), layout="constrained")
         axes = figure.subplots(1, 3)
         for axis, (title, of) in zip(axes, parts.items(), strict=False):
             panel(axis, of, title)
         panel(axes[2], {f"mean of these {len(everything)}": np.mean(everything, axis=0)}, "all together")
         axes[0].set_ylabel("observed to hold it, %")
         # The legends lie below the axes, where the layout does not look: leave them room.
-        figure.get_layout_engine().set(rect=(0.0, 0.12, 1.0, 0.88))
+        figure.get_layout_engine().set(rect=(0.0, 0.2, 1.0, 0.78))
         text = StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
     PICTURE.write_text(re.sub(r"(\d\.\d\d)\d+", r"\1", text.getvalue()), encoding="utf-8")
