@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from filters.kernels.bank import LOG_TWO_PI
 from filters.kernels.compile import function, kernel
+from filters.kernels.error_level import log_sum
 
 Float64Array = NDArray[np.float64]
 
@@ -36,15 +37,9 @@ def spread_between(covariance: Float64Array, jacobian: Float64Array, other: Floa
 @function
 def normalise(logs: Float64Array) -> None:
     """Make logarithms those of probabilities that sum to one."""
-    top = -math.inf
+    total = log_sum(logs)
     for i in range(logs.size):
-        top = max(top, logs[i])
-    total = 0.0
-    for i in range(logs.size):
-        total += math.exp(logs[i] - top)
-    top += math.log(total)
-    for i in range(logs.size):
-        logs[i] -= top
+        logs[i] -= total
 
 
 @function

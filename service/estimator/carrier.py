@@ -52,9 +52,11 @@ class Pose(NamedTuple):
         covariance = self.covariance.copy()
         covariance[:2, :2] += added
         wider = radius(covariance[:2, :2], 0.95)
-        # with several hypotheses the radius is larger than the covariance alone would have it
-        beyond = math.sqrt(max(0.0, wider * wider - own * own + self.radius95 * self.radius95))
-        return self._replace(covariance=covariance, radius95=beyond)
+        if (
+            self.radius95 > 1.01 * own
+        ):  # that of several hypotheses is larger than the covariance would have it
+            wider = math.sqrt(max(0.0, wider * wider - own * own + self.radius95 * self.radius95))
+        return self._replace(covariance=covariance, radius95=wider)
 
 
 class Carrier(Protocol):

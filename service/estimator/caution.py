@@ -20,13 +20,13 @@ from filters.linearised.noise_shares import NoiseShares, SensorShare
 from filters.particle import ParticleFilter
 from filters.sensing import PositionMeasurement, RangeMeasurement
 from service.config import Configuration
+from service.estimator.gaussian import gaussian_of, is_one_place
 from service.estimator.ground import GroundVehicle
 from service.estimator.measuring import Measurement
 from service.estimator.vehicle import Vehicle
-from service.estimator.witnesses import gaussian_of
 
-NARROW, NARROW_HEADING = 3.0, 0.35
-"""Metres and radians: the spread of a belief that Gaussians can stand for."""
+NARROW = 3.0
+"""Metres: the spread of a belief that Gaussians can stand for."""
 
 FAR = 16.0
 """Squared distance from the belief, in standard deviations, at which they begin anew as it is."""
@@ -127,15 +127,14 @@ class Caution:
 
     def _check(self) -> None:
         moments = self._belief.moments()
-        plane = moments.pose_covariance[:2, :2]
-        wide = float(np.trace(plane)) > 2.0 * NARROW**2
-        if wide or float(moments.variance[2]) > NARROW_HEADING**2:
+        if not is_one_place(moments, NARROW):
             self._shares.stop()
             return
         self._shares.pass_second()
         if self._shares.live:
             away = moments.mean[:2] - self._shares.mean()
             own: Matrix = self._shares.bank.covariance[:, :2, :2].mean(axis=0)
+            plane = moments.pose_covariance[:2, :2]
             if float(away @ np.linalg.solve(own + plane + 0.01 * np.eye(2), away)) < FAR:
                 return
         self._shares.begin(*gaussian_of(self._belief, self._vehicle.motion.conditional_variances))

@@ -3,10 +3,10 @@
 Wheels that begin to spin, or that grip again, change their speed within a moment while the vehicle goes on as it did.
 The speed of a stretch, less what the forward specific force has added up to by its middle, is level but for noise as
 long as they hold, and so is the median of five: counts that were stamped a moment late make a stretch or two slow or
-fast, and the speed comes back. How large that noise is depends on the unit, on how
-it is mounted and on the ground, so its scale is learned, as that of a Student's t of four degrees of freedom (Lange,
-Little and Taylor, "Robust statistical modeling using the t distribution", JASA 84, 1989: the weights (v + 1) / (v + e²)
-make a few great errors count for little), and with it the mean: an accelerometer that is mounted askew feels gravity.
+fast, and the speed comes back. How large that noise is depends on the unit, on how it is mounted and on the ground, so
+its scale is learned, as that of a Student's t of four degrees of freedom (Lange, Little and Taylor, "Robust statistical
+modeling using the t distribution", JASA 84, 1989: the weights (v + 1) / (v + e²) make a few great errors count for
+little), and with it the mean: an accelerometer that is mounted askew feels gravity.
 
 Wheels that slip all the while change their speed by more than the vehicle does, in proportion. Nothing is said of
 wheels that begin to slip gently while nobody accelerates, of a distance that no wheel counted, or where there is no

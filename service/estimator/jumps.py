@@ -66,7 +66,8 @@ class Jumps:
         if before.health is not HealthState.TRACKING:
             self._untracked = before.monotonic_ns
         tracks = before.monotonic_ns - self._untracked > WAKE
-        if math.hypot(self._north, self._east) > (max(FAR, before.radius95 or 0.0) if tracks else FAR):
+        limit = max(FAR, before.radius95 or 0.0) if tracks else FAR
+        if math.hypot(self._north, self._east) > limit:
             if estimate.monotonic_ns - self._last > WAKE:
                 self._step(estimate.monotonic_ns)
             self._north = self._east = 0.0

@@ -1,8 +1,8 @@
 """Widens what is published by what a receiver's lasting error may have done to the belief (:mod:`filters.consider`).
 
 Where the lasting error is no state of the particles (:mod:`service.estimator.receivers`), they weigh fixes as if their
-errors were new every second. Published is, beside the particles' own spread, the
-share of the mean that the receiver's error of the last minute has, reckoned along with every absolute measurement.
+errors were new every second. Published is, beside the particles' own spread, the share of the mean that the receiver's
+error of the last minute has, reckoned along with every absolute measurement.
 
 A latency that was stated lasts longer still: it is not known better than to some hundredths of a second, and shifts all
 fixes by as much of the way. So much is the region wider along the velocity.
@@ -17,7 +17,6 @@ import numpy as np
 from drivers.sample import SECOND
 from filters.belief import Evidence
 from filters.consider import LastingError
-from filters.density.gaussian import radius
 from filters.sensing import PositionMeasurement
 from service.estimator.carrier import Pose
 from service.estimator.measuring import Measurement
@@ -25,9 +24,6 @@ from service.estimator.receivers import Receivers
 
 DURATION = 60.0
 """Seconds over which reflections and atmosphere change what a receiver says."""
-
-REACH = math.sqrt(-2.0 * math.log(0.05))
-"""Standard deviations of a round Gaussian in the plane that hold 95 %."""
 
 ONE_AXIS = 0.5
 """A measurement of one dimension (a range) corrects half of the plane."""
@@ -74,16 +70,8 @@ class Lasting:
         """Return ``pose`` with the lasting error's variance on both axes; its own is what the next gains are of."""
         self._variance = 0.5 * float(pose.covariance[0, 0] + pose.covariance[1, 1])
         way = self._timing * np.array([pose.velocity[0] or 0.0, pose.velocity[1] or 0.0])
-        added = self._error.variance + 0.5 * float(way @ way)
-        if added <= 0.0:
-            return pose
-        own = radius(pose.covariance[:2, :2], 0.95)
-        covariance = pose.covariance.copy()
-        covariance[:2, :2] += self._error.variance * np.eye(2) + np.outer(way, way)
-        wider = radius(covariance[:2, :2], 0.95)
-        # with several hypotheses the radius is larger than the covariance alone would have it
-        beyond = math.hypot(pose.radius95, REACH * math.sqrt(added)) if pose.radius95 > 1.01 * own else wider
-        return pose._replace(covariance=covariance, radius95=beyond)
+        added = self._error.variance * np.eye(2) + np.outer(way, way)
+        return pose.wider(added) if added.any() else pose
 
 
 def _sigma(measured: Measurement) -> float:

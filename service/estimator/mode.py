@@ -30,11 +30,11 @@ from filters.particle import ParticleFilter
 from filters.transition import Drift
 from service.config import Configuration
 from service.estimate import MotionMode
+from service.estimator.gaussian import gaussian_of, is_one_place
 from service.estimator.grip import NOTHING, Grip, Said
 from service.estimator.ground import GroundVehicle
 from service.estimator.measuring import Measurement
 from service.estimator.vehicle import Vehicle
-from service.estimator.witnesses import gaussian_of
 
 GENERATOR = np.array(((-0.2, 0.2, 0.0), (0.05, -0.06, 0.01), (0.05, 0.2, -0.25)))
 """Per second: how often still, moving, slipping (rows) turn into each other; a slip lasts some 5 s, each 100 s."""
@@ -77,8 +77,8 @@ SLIPPERY, GRIPPING = 0.4, 0.1
 CERTAIN = 0.9
 """Probability from which the vehicle is treated as standing."""
 
-NARROW, NARROW_HEADING = 3.0, 0.35
-"""Metres and radians: the spread of a belief that two Gaussians can stand for."""
+NARROW = 3.0
+"""Metres: the spread of a belief that two Gaussians can stand for."""
 
 CHECKING = SECOND
 """Nanoseconds after which they are compared with the belief again."""
@@ -234,8 +234,7 @@ class Mode:
         """Begin anew as the belief where the Gaussians are not live or have lost it."""
         moments = self._belief.moments()
         self._bias = float(moments.mean[3])
-        wide = float(np.trace(moments.pose_covariance[:2, :2])) > 2.0 * NARROW**2
-        if wide or float(moments.variance[2]) > NARROW_HEADING**2:
+        if not is_one_place(moments, NARROW):
             self._bank.live[:] = False
             return
         if self._bank.live[0]:

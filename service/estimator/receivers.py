@@ -29,10 +29,10 @@ from filters.particle import ParticleFilter
 from filters.sensing import Position, PositionMeasurement
 from filters.sensing.biased_position import Bias, BiasedPosition
 from service.config import Configuration
+from service.estimator.gaussian import gaussian_of, is_one_place
 from service.estimator.ground import GroundVehicle
 from service.estimator.measuring import Measurement
 from service.estimator.start import receiver_name
-from service.estimator.witnesses import gaussian_of
 
 PLACE = ("north", "east")
 
@@ -42,8 +42,8 @@ FADING = SECOND // 4
 GATHERED = SECOND // 4
 """Nanoseconds of driving that those who learn of an error are moved by at once, at most."""
 
-NARROW, NARROW_HEADING = 6.0, 0.35
-"""Metres and radians: the spread of a belief that Gaussians can stand for."""
+NARROW = 6.0
+"""Metres: the spread of a belief that Gaussians can stand for."""
 
 FAR = 16.0
 """Squared distance from the belief, in standard deviations, at which they begin anew as it is."""
@@ -235,7 +235,7 @@ class Receivers:
 
     def _check(self) -> None:
         """See whether those who learn still are of the belief, and take what they have learned."""
-        narrow = _narrow(self._belief)
+        narrow = is_one_place(self._belief.moments(), NARROW)
         for receiver in self._receivers.values():
             learner = receiver.learner
             if not narrow or not receiver.seated:
@@ -288,13 +288,6 @@ class Receivers:
         for receiver in self._receivers.values():
             for name, place, before in zip(receiver.bias, PLACE, places, strict=True):
                 self._belief.column(name)[:] += before - self._belief.column(place)
-
-
-def _narrow(belief: ParticleFilter[Any]) -> bool:
-    """Say whether a belief is one place."""
-    moments = belief.moments()
-    plane = float(moments.variance[0] + moments.variance[1])
-    return plane <= 2.0 * NARROW**2 and float(moments.variance[2]) <= NARROW_HEADING**2
 
 
 def biases_of(configuration: Configuration) -> dict[str, Bias]:

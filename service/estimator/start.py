@@ -27,8 +27,10 @@ class Anchor(NamedTuple):
 
 
 DELAY = "gnss_delay"
-RECEIVER_BIAS = "position_bias"
 """The slow state of a receiver's delay: one for its positions and its velocities, which come of the same fix."""
+
+RECEIVER_BIAS = "position_bias"
+"""What the names of the states of receivers' errors begin with."""
 
 SENSOR_WALK = 1e-4
 """Per √s; how fast a sensor's scale or bias wanders."""
@@ -48,7 +50,6 @@ MARGINALISED = {
     "velocity_down": ZERO,
 }
 """Mean and spread of the columns whose own spread at the start the motion model knows."""
-
 
 BIASES = {"range": (0.2, 0.003), "altitude": (100.0, 0.02), "speed": (0.1, 0.001)}
 """What a bias may be at the start, and its walk per √s, where the configuration does not say, by kind. Of an altitude

@@ -14,10 +14,8 @@ out two to three seconds after its first great lie, one wrong reading flags nobo
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -35,10 +33,11 @@ from filters.sensing import Heading, Position, Range, Velocity
 from filters.sensing.speed import WheelSpeed
 from service.config import Configuration
 from service.estimator.dispute import Dispute
-from service.estimator.lie import Lie
+from service.estimator.gaussian import gaussian_of, is_one_place
+from service.estimator.groups import USUAL, Group, Judged, group_of
 from service.estimator.measuring import Measurement
 from service.estimator.vehicle import Vehicle
-from service.estimator.witnesses import SPAN, WILD, Witnesses, gaussian_of
+from service.estimator.witnesses import SPAN, Witnesses
 
 MOST_GROUPS, MOST_SENSORS = 16, 32
 """Groups and sensors beyond so many are not judged."""
@@ -60,22 +59,13 @@ wild readings that one lives with for ever. Among ranges they are many, among po
 DOUBT, DOUBT_OF_A_LIAR = 8.0, 5.0
 """Nats: of an innovation that speaks neither way, 4 standard deviations; 3.2 for a group that has been caught."""
 
-TOGETHER, SHARED = 10.4, 5.4
-"""Nats for a receiver's position and velocity together, and what the velocity has in them at most. Of four dimensions
-honest readings are as rarely beyond 10.4 as of two beyond 8, and the position must be off by 3 standard deviations.
-Reflections move a position by metres and leave the velocity; one who leads both away tells on himself by both."""
-
-STRANGE = 4.0
-"""Seconds over which the share of a sensor's wild readings is taken."""
+TOGETHER = 10.4
+"""Nats for a receiver's position and velocity together. Of four dimensions honest readings are as rarely beyond that as
+of two beyond 8, and the position must be off by 3 standard deviations. Reflections move a position by metres and leave
+the velocity; one who leads both away tells on himself by both."""
 
 YOUNGEST = 5 * SECOND
 """Nanoseconds between two beginnings of witnesses at least, when the belief is young."""
-
-LESSON, LEARNING = SECOND, 10.0
-"""A reading in so many nanoseconds teaches what errors are usual, and this many as much as one independent one."""
-
-HINDSIGHT = 60 * SECOND
-"""Readings teach only when they are so old and nobody was caught since: a drag of 0.5 m/s is not to pass as usual."""
 
 MARGIN = 4.0
 """Nats by which a witness may be contradicted more than another group's and still accuse."""
@@ -98,122 +88,8 @@ LEAST_CAUTION = 0.25
 STRAYED = 0.2
 """Radians that nobody measured, from which on a witness has lost his way: where he is then is no ellipse any more."""
 
-NARROW, PLACED = 0.35, 5.0
-"""Radians and metres: a belief with less spread than this is one place, and makes a witness."""
-
-USUAL: dict[type, float] = {Position: 5.0, Velocity: 0.5, Range: 1.5, Heading: 0.15, WheelSpeed: 0.3}
-"""Slow errors that an honest sensor may have whatever it claims: multipath of 5 m, a beacon's bias; m, m/s, rad."""
-
-
-@dataclass
-class Judged:
-    """One sensor.
-
-    Attributes
-    ----------
-    place : int
-        Of its log odds.
-    level : ErrorLevel
-        What errors are normal for it.
-    absolute : bool
-        Whether it says where the vehicle is.
-    ranging : bool
-        Whether it is a range.
-    worst : float
-        Log odds that a second of readings takes from it at most.
-    heard : int or None
-        When, nanoseconds.
-    agreed, flagged : bool
-        Whether it has ever earned trust, and whether it has lost it.
-    strange : float
-        Share of its readings that its witness takes for wild, by the noise that they claim; 0 to 1.
-    lessons : deque
-        Testimonies that the level has yet to learn from, with their times.
-    """
-
-    place: int
-    level: ErrorLevel
-    absolute: bool
-    ranging: bool
-    worst: float
-    heard: int | None = None
-    agreed: bool = False
-    flagged: bool = False
-    strange: float = 0.0
-    lessons: deque[tuple[int, Testimony]] = field(default_factory=deque[tuple[int, Testimony]])
-
-    def remember(self, testimony: Testimony, honest: bool) -> None:
-        """Note a testimony of now to learn from later, if it was an honest one, and learn from the ones of long ago."""
-        now = self.heard or 0
-        if honest and (not self.lessons or now - self.lessons[-1][0] >= LESSON):
-            self.lessons.append((now, testimony))
-        while self.lessons and now - self.lessons[0][0] > HINDSIGHT:
-            self.level.learn(*self.lessons.popleft()[1], 1.0 / LEARNING)
-
-    def compare(self, opinion: Opinion, weight: float) -> None:
-        """Note whether a reading is wild for its witness."""
-        self.strange += weight / STRANGE * ((opinion.nis > WILD) - self.strange)
-
-    def weight(self, time: int) -> float:
-        """Return how much of a second has passed since the reading before, at most one, and note this one."""
-        elapsed = 1.0 if self.heard is None else (time - self.heard) / SECOND
-        self.heard = time
-        return min(1.0, max(0.0, elapsed))
-
-
-@dataclass
-class Group:
-    """Sensors that would lie together; those that do not say where the vehicle is follow those that do."""
-
-    place: int
-    sensors: dict[str, Judged] = field(default_factory=dict[str, Judged])
-    lie: Lie = field(default_factory=Lie)
-    accuser: int | None = None
-    pace: float = 0.0
-
-    def note(self, surprise: float, weight: float) -> None:
-        """Note by how many nats a velocity surprised the witness, for the average of the last seconds."""
-        self.pace += weight / STRANGE * (min(SHARED, surprise) - self.pace)
-
-    def support(self, time: int) -> float:
-        """Return the nats that the velocity adds to what speaks against the position; none if it has been silent."""
-        heard = [sensor.heard for sensor in self.sensors.values() if not sensor.absolute and sensor.heard]
-        return self.pace if heard and time - max(heard) < STRANGE * SECOND else 0.0
-
-    @property
-    def flagged(self) -> bool:
-        """Whether one of it that says where the vehicle is has been caught, or all of it."""
-        leading = [sensor.flagged for sensor in self.sensors.values() if sensor.absolute]
-        return any(leading) if leading else all(sensor.flagged for sensor in self.sensors.values())
-
-    def believes(self, sensor: Judged) -> bool:
-        """Say whether one of it is believed: who does not say where the vehicle is may go its own way."""
-        if self.flagged and not sensor.absolute:
-            return not sensor.flagged and self.lie.leaves_alone
-        return not sensor.flagged
-
-    @property
-    def absolute(self) -> bool:
-        """Whether one of it says where the vehicle is."""
-        return any(sensor.absolute for sensor in self.sensors.values())
-
-    @property
-    def ranging(self) -> bool:
-        """Whether it is a beacon: its ranges alone place nobody."""
-        return any(sensor.ranging for sensor in self.sensors.values())
-
-    @property
-    def agreed(self) -> bool:
-        """Whether one of it has ever earned trust."""
-        return any(sensor.agreed for sensor in self.sensors.values())
-
-
-def group_of(name: str, sample: Sample) -> str:
-    """Return the group of a sensor: a receiver's position and velocity are one, each beacon is its own."""
-    kind, _, rest = name.partition("/")
-    return (
-        f"receiver/{rest}/{sample.source}" if kind in ("position", "velocity") else f"{name}/{sample.source}"
-    )
+PLACED = 5.0
+"""Metres: a belief with less spread than this is one place, and makes a witness."""
 
 
 class Trust:
@@ -229,7 +105,6 @@ class Trust:
         Witnesses begin as it is.
     control : callable
         What was rolled and turned between two times.
-
     seed : int
         Of the particles that are drawn where a group has led the belief away.
     """
@@ -277,9 +152,9 @@ class Trust:
         """Whether it is one alone that disagrees, which once agreed and has a witness.
 
         It is when nobody else says where the vehicle is, or when its witness takes its readings for wild and not those
-        of the others. No search is to follow it then: it may be a lie, and that is
-        decided here. A vehicle that was carried away has all witnesses wrong, so a search is held back for as long as
-        it takes them to notice: ten readings of the others.
+        of the others. No search is to follow it then: it may be a lie, and that is decided here. A vehicle that was
+        carried away has all witnesses wrong, so a search is held back for as long as it takes them to notice: ten
+        readings of the others.
         """
         placed = [group for group in self._groups.values() if group.absolute and self._recent(group)]
         return any(
@@ -401,9 +276,7 @@ class Trust:
         (mean, covariance), self._undo = self._undo, None
         for name, variance in self._motion.conditional_variances.items():
             row = self._belief.names.index(name)
-            covariance[row, row] -= (
-                variance  # the motion model has that much beside the particles' own values
-            )
+            covariance[row, row] -= variance  # the model has that much beside the particles' own values
         self._taken_back += 1
         random = np.random.Generator(np.random.Philox(key=(self._seed, self._taken_back)))
         drawn = mean[:, None] + root(covariance) @ random.standard_normal((mean.size, self._belief.count))
@@ -489,10 +362,7 @@ class Trust:
             self._undo = witness
 
     def _begin(self, groups: list[Group]) -> None:
-        moments = self._belief.moments()
-        if self.divided:
-            return
-        if float(moments.variance[2]) > NARROW**2 or float(moments.variance[:2].sum()) > 2.0 * PLACED**2:
+        if self.divided or not is_one_place(self._belief.moments(), PLACED):
             return
         gaussian = gaussian_of(self._belief, self._motion.conditional_variances)
         self._witnesses.begin([group.place for group in groups], self._time, *gaussian)

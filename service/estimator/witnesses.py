@@ -24,9 +24,7 @@ from filters.kernels.expectations import note
 from filters.linearised.bank import BATCHED, Expectations, GaussianBank
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle
-from filters.particle import ParticleFilter
 from service.estimator.measuring import Measurement
-from service.estimator.start import RECEIVER_BIAS
 
 SPAN = 120 * SECOND
 """How old a witness gets. Half of it must be longer than the slowest drag-off takes to be seen: 20 m at 0.5 m/s."""
@@ -44,10 +42,6 @@ MEMORY = 20.0
 """Seconds over which contradictions are summed up."""
 
 SLOTS = 2
-SAMPLE = 2048
-"""The belief's covariance is taken over so many particles at most."""
-
-_HEADING = 2
 
 
 class Witnesses:
@@ -175,35 +169,3 @@ class Witnesses:
     def gaussian(self, member: int) -> tuple[Matrix, Matrix]:
         """Return mean and covariance of a witness."""
         return self.bank.mean[member].copy(), self.bank.covariance[member].copy()
-
-
-def gaussian_of(
-    belief: ParticleFilter[Any], given_path: dict[str, float], errors: Sequence[str] = ()
-) -> tuple[Matrix, Matrix]:
-    """Return mean and covariance of a belief, over an even sample of its particles.
-
-    The errors of receivers, which come last, are left out, but for those that are asked for.
-
-    Parameters
-    ----------
-    given_path : dict[str, float]
-        Variances of the marginalised dimensions beside the spread of the particles' own values.
-    errors : sequence of str
-        Receivers' errors that are to follow the other dimensions.
-    """
-    step = -(-belief.count // SAMPLE)
-    weights = belief.weights[::step].astype(np.float64)
-    weights /= weights.sum()
-    names = [*(name for name in belief.names if not name.startswith(RECEIVER_BIAS)), *errors]
-    rows = [belief.names.index(name) for name in names]
-    columns: NDArray[np.float64] = belief.columns[rows, : belief.count : step].astype(np.float64)
-    heading = columns[_HEADING]
-    centre = math.atan2(weights @ np.sin(heading), weights @ np.cos(heading))
-    columns[_HEADING] = centre + np.remainder(heading - centre + math.pi, 2.0 * math.pi) - math.pi
-    mean = columns @ weights
-    away = columns - mean[:, None]
-    covariance = (away * weights) @ away.T
-    for name, variance in given_path.items():
-        row = names.index(name)
-        covariance[row, row] += variance
-    return mean, 0.5 * (covariance + covariance.T)

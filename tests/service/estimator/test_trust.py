@@ -16,9 +16,10 @@ from drivers.sample import SECOND
 from filters import error_level
 from filters.kalman import Matrix
 from service.estimator import witnesses
+from service.estimator.groups import group_of
 from service.estimator.lie import Lie
 from service.estimator.measuring import Measurement
-from service.estimator.trust import Trust, group_of
+from service.estimator.trust import Trust
 from tests.service.estimator.driving import STEP, Drive
 
 Flags = list[tuple[float, str, bool]]
