@@ -1,9 +1,9 @@
 """Measure whether what is claimed is observed, and what each mechanism is worth: ``make honesty`` (``SEEDS=5``).
 
 Every scenario is run by the command that a user would type, and what it counted is kept in honesty.json, beside what
-``make accuracy`` counted of the recordings: where one is absent, what was measured last stands. Of that are made the
-calibration curves (honesty-calibration.svg) and three tables of accuracy.md. ``--only NAME`` measures what holds that
-name, ``--draw-only`` nothing.
+``make accuracy`` counted of the recordings: where one is absent, what was measured last stands. The recordings that a
+mechanism matters to are replayed without it, too. Of that are made the calibration curves (honesty-calibration.svg) and
+three tables of accuracy.md. ``--only NAME`` measures what holds that name, ``--draw-only`` nothing.
 """
 
 from __future__ import annotations
@@ -26,10 +26,25 @@ PICTURE = FOLDER / "honesty-calibration.svg"
 CALIBRATION = ("<!-- calibration: begin -->", "<!-- calibration: end -->")
 CHECKS = ("<!-- checks: begin -->", "<!-- checks: end -->")
 ABLATION = ("<!-- ablation: begin -->", "<!-- ablation: end -->")
+HOUR = "multipath, an hour"
+"""A tenth of the seeds: it is long."""
+
 SCENARIOS = ("beacons", "mirror", "kidnap", "late_fix", "spoof", "multipath", "slip", "jam", "outage")
+TRACES = {
+    "sitl_jam": ["../shared/data/sitl_jam.tlog"],
+    "plaza2, from anywhere, second half": [
+        *("../shared/data/plaza2.tlog", "--config", "out/accuracy/plaza2_field.toml"),
+        *("--truth", "out/accuracy/plaza2_truth_second_half.csv"),
+    ],
+}
+"""Recordings to which the mechanisms matter, by the name that ``make accuracy`` gives them, with what replays them."""
+
 SWITCHES = ("hypotheses", "recovery", "trust", "motion_mode", "noise_learning", "lasting_errors")
 LIED_TO = ("kidnap",)
 """Scenarios whose start is a lie told with certainty: no belief can be right until the evidence comes."""
+
+TRIMMED = "trimmed"
+"""Copies of a recording: they have their row, but do not count in the mean once more."""
 
 MARGIN = 4.0
 """Points by which observed may differ from claimed."""
@@ -42,9 +57,14 @@ def wanted(seeds: int) -> Iterator[tuple[str, str, list[str]]]:
     """Yield every measurement: which part of the file, its name there, the command."""
     for name in SCENARIOS:
         yield "scenarios", name, ["scenario", name, "--seeds", str(seeds)]
+    hours = ["scenario", "multipath", "--seconds", "3600", "--seeds", str(max(1, seeds // 10))]
+    yield "scenarios", HOUR, hours
     for switch in SWITCHES:
         for name in SCENARIOS:
             command = ["scenario", name, "--seeds", str(seeds), "--without", switch]
+            yield f"without {switch}", name, command
+        for name, logs in TRACES.items():
+            command = ["replay", *logs, "--seeds", str(seeds), "--without", switch]
             yield f"without {switch}", name, command
 
 
@@ -68,15 +88,20 @@ def curve(levels: list[int]) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(counts) / counts.sum()])
 
 
+def counts(name: str) -> bool:
+    """Say whether a row counts in the mean: nobody lied to it, and it is no copy."""
+    return name not in LIED_TO and TRIMMED not in name
+
+
 def curves(kept: dict[str, Any], part: str) -> dict[str, np.ndarray]:
-    """Return the curves of a part, by name, of whatever had a truth and was not lied to."""
-    told = {name: one for name, one in kept.get(part, {}).items() if name not in LIED_TO}
+    """Return the curves of a part, by name, of whatever had a truth and counts."""
+    told = {name: one for name, one in kept.get(part, {}).items() if counts(name)}
     return {name: curve(one["levels"]) for name, one in told.items() if one["levels"]}
 
 
 def plain(name: str) -> str:
     """Return a name without the marks of the page."""
-    return name.replace("`", "").split(",")[0] + (" (trimmed)" if "trimmed" in name else "")
+    return name.replace("`", "").split(",")[0]
 
 
 def panel(axis: Axes, of: dict[str, np.ndarray], title: str) -> None:
@@ -138,7 +163,7 @@ def calibration(kept: dict[str, Any]) -> str:
             if not one["levels"]:
                 continue
             observed = curve(one["levels"])
-            every += [observed] if name not in LIED_TO else []
+            every += [observed] if counts(name) else []
             low, high = one["nees_bounds"]
             cells = (
                 f"scenario `{name}`" if part == "scenarios" else name,
@@ -172,12 +197,14 @@ def passed(one: dict[str, Any]) -> str:
 
 def ablation(kept: dict[str, Any]) -> str:
     """Return the table of what is left when one mechanism is switched off."""
-    head = ("scenario", "everything on", *(f"without {switch}" for switch in SWITCHES))
+    head = ("", "everything on", *(f"without {switch}" for switch in SWITCHES))
     lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
-    for name in SCENARIOS:
-        parts = [kept.get(part, {}).get(name) for part in ("scenarios", *(f"without {s}" for s in SWITCHES))]
+    rows = [("scenarios", name) for name in SCENARIOS] + [("recordings", name) for name in TRACES]
+    for whole, name in rows:
+        parts = [kept.get(part, {}).get(name) for part in (whole, *(f"without {s}" for s in SWITCHES))]
         if any(one is not None for one in parts):
-            lines.append(f"| `{name}` | {' | '.join(worth(one) for one in parts)} |")
+            shown = f"scenario `{name}`" if whole == "scenarios" else name
+            lines.append(f"| {shown} | {' | '.join(worth(one) for one in parts)} |")
     return "\n".join(lines)
 
 
@@ -186,7 +213,8 @@ def worth(one: dict[str, Any] | None) -> str:
     if one is None or "rmse_m" not in one:
         return "–"
     figures = f"{metres(one['rmse_m']['mean'])}, {metres(one['max_m']['max'])}, {percent(one['coverage_95'])}"
-    return f"**{passed(one)}**; {figures}"
+    asked = passed(one)
+    return f"**{asked}**; {figures}" if asked else figures
 
 
 def metres(value: float) -> str:

@@ -21,13 +21,13 @@ from rich.console import Console
 from rich.progress import Progress
 
 from service.checks import judge, read_events
-from service.config import Configuration, Honesty
 from service.replay.command import PARTICLES
 from service.replay.run import Plan, Run, replay
 from service.replay.seeds import summary
 from service.replay.site import setting_of
 from service.replay.table import show, show_checks
 from service.score import read_truth
+from service.switches import switched_off, unknown_switches
 
 SIMULATOR = (sys.executable, "-m", "sim_vehicle")
 
@@ -51,21 +51,8 @@ class Play:
     seconds: float | None = None
     without: tuple[str, ...] = ()
 
-    def configured(self, configuration: Configuration) -> Configuration:
-        """Return ``configuration`` with the switches turned off."""
-        switches = dict.fromkeys(self.without, False)
-        return configuration.model_copy(update={"honesty": configuration.honesty.model_copy(update=switches)})
-
 
 AS_IT_IS = Play()
-
-
-def unknown_switches(without: tuple[str, ...]) -> str:
-    """Return what is wrong with the names of switches, in the user's words; nothing if they are all known."""
-    wrong = [name for name in without if name not in Honesty.model_fields]
-    if not wrong:
-        return ""
-    return f"--without {', '.join(wrong)}: [honesty] has {', '.join(Honesty.model_fields)}"
 
 
 def simulate(name: str, seed: int, stem: Path, seconds: float | None = None) -> None:
@@ -101,7 +88,8 @@ def run_once(name: str, seed: int, play: Play = AS_IT_IS) -> Run:
         )
         setting = setting_of(logs, stem.with_name(name + ".toml"), stem.with_name(name + "_truth.csv"))
         truth = read_truth(setting.truth) if setting.truth else None
-        run = replay(Plan(logs, play.configured(setting.configuration), PARTICLES, truth), seed)
+        configuration = switched_off(setting.configuration, play.without)
+        run = replay(Plan(logs, configuration, PARTICLES, truth), seed)
         if run.story is not None and truth is not None:
             table = stem.with_name(name + "_events.csv")
             story = run.story.beside(truth, read_events(table) if table.is_file() else ())

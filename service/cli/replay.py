@@ -77,6 +77,12 @@ def command(
             metavar="WHAT:FROM-TO",
         ),
     ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A switch of \\[honesty] to turn off (trust, hypotheses, …, see docs); may be repeated."
+        ),
+    ] = None,
 ) -> None:
     """Replay recordings and print the error, the coverage and the health."""
     from service import kernels
@@ -84,4 +90,8 @@ def command(
     kernels.prepare()
     from service import replay
 
-    leave(replay.command(logs, config, truth, seeds, out, report, as_json, particles, decisions, blank or ()))
+    leave(
+        replay.command(
+            logs, config, truth, seeds, out, report, as_json, particles, decisions, blank or (), without or ()
+        )
+    )

@@ -21,6 +21,7 @@ from service.replay.site import setting_of
 from service.replay.sources import LogError
 from service.replay.table import show
 from service.score import read_truth
+from service.switches import switched_off, unknown_switches
 
 PARTICLES = 5000
 """How many particles a replay affords where the command does not say."""
@@ -97,14 +98,19 @@ def command(
     particles: int | None,
     decisions: Path | None = None,
     blank: Sequence[str] = (),
+    without: Sequence[str] = (),
 ) -> int:
-    """Run ``beliefd replay`` and return its exit status: 0 done, 1 a log could not be replayed."""
+    """Run ``beliefd replay`` and return its exit status: 0 done, 1 a log could not be replayed, 2 not understood."""
     console = Console(stderr=as_json_object)
+    if wrong := unknown_switches(tuple(without)):
+        console.print(wrong, highlight=False, markup=False, style="red")
+        return 2
     try:
         if report is not None:
             require_report()
         blanks = tuple(Blank.of(text) for text in blank)
         plan = plan_of(tuple(logs), config, truth, out, particles, console, blanks)
+        plan = replace(plan, configuration=switched_off(plan.configuration, tuple(without)))
         if decisions is not None:
             plan = replace(plan, decisions=tuple(read_decisions(decisions)), recorded=None)
         runs = run_with_bars(replace(plan, traced=None if report is None else 0), list(range(seeds)), console)

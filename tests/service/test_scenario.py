@@ -8,7 +8,6 @@ import json
 import pytest
 from rich.console import Console
 
-from service.config import Configuration, MavlinkLink, Vehicle
 from service.replay.run import Run
 from service.replay.table import show_checks
 from service.scenario import Play, command, run_once
@@ -48,14 +47,6 @@ def test_the_table_counts_the_seeds_that_passed(run: Run) -> None:
     show_checks([run, run], Console(file=out, width=120))
     line = next(line for line in out.getvalue().splitlines() if "no step of reset_counter" in line)
     assert "2 of 2" in line
-
-
-def test_a_switch_is_turned_off_and_the_others_stay() -> None:
-    link = MavlinkLink(name="autopilot", kind="mavlink", url="udpin:127.0.0.1:14550")
-    whole = Configuration(vehicle=Vehicle(name="x"), link=(link,))
-    told = Play(without=("trust",)).configured(whole).honesty
-    assert told == whole.honesty.model_copy(update={"trust": False})
-    assert Play().configured(whole).honesty == whole.honesty
 
 
 def test_a_switch_that_there_is_not_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

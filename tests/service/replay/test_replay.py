@@ -14,6 +14,7 @@ from drivers.sample import Odometer, Sample
 from service.decisions import Decided
 from service.estimator import Cause, Level
 from service.replay import Plan, Run, replay
+from service.replay.command import command
 from service.replay.rows import HEADER
 from service.replay.run import ticks_of
 from service.replay.seeds import replay_seeds, summary
@@ -184,9 +185,9 @@ def test_a_log_of_another_kind_than_the_links_says_so(drive: Path, tmp_path: Pat
 
 
 def test_the_command_prints_one_json_object(drive: Path, tmp_path: Path) -> None:
-    command = [str(Path(sys.executable).with_name("beliefd")), "replay", *map(str, logs_of(drive))]
+    program = [str(Path(sys.executable).with_name("beliefd")), "replay", *map(str, logs_of(drive))]
     done = subprocess.run(
-        [*command, "--json", "--out", str(tmp_path)], capture_output=True, text=True, check=True
+        [*program, "--json", "--out", str(tmp_path)], capture_output=True, text=True, check=True
     )
     result = json.loads(done.stdout)
     run = result["runs"][0]
@@ -194,3 +195,21 @@ def test_the_command_prints_one_json_object(drive: Path, tmp_path: Path) -> None
     assert set(run) >= {"particles_mean", "late_samples", "dropped", "health", "seconds", "real_time_factor"}
     assert result["summary"]["seeds"] == 1
     assert (tmp_path / "estimates_seed0.csv").is_file()
+
+
+def test_a_switch_that_is_turned_off_changes_the_run(drive: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def told(*without: str) -> dict[str, object]:
+        logs = list(logs_of(drive))
+        status = command(logs, None, None, 1, None, None, as_json_object=True, particles=500, without=without)
+        assert status == 0
+        return json.loads(capsys.readouterr().out)["runs"][0]
+
+    assert told()["log_score"] != told("noise_learning")["log_score"]
+
+
+def test_a_switch_that_there_is_not_is_refused(drive: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    logs = list(logs_of(drive))
+    assert (
+        command(logs, None, None, 1, None, None, as_json_object=False, particles=None, without=["luck"]) == 2
+    )
+    assert "--without luck: [honesty] has hypotheses," in capsys.readouterr().out
