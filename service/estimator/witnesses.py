@@ -6,6 +6,9 @@ worth something only from a while back. The two of a group begin in turns, ``SPA
 between ``SPAN / 2`` and ``SPAN`` old. While the belief is young they begin sooner, each when the other is half as old
 as the belief: one that began before gyro and wheels were known soon strays by a metre a second. While anyone is under
 suspicion none begins anew: the belief may be wrong already.
+
+A witness is a Kalman filter, linearised about its mean: without wheels and gyro for some seconds its heading is gone,
+and what it hears then moves it metres from the truth while it says decimetres. It is dismissed before.
 """
 
 from __future__ import annotations
@@ -41,7 +44,12 @@ WILD, WILD_MEMORY = 13.8, 0.05
 MEMORY = 20.0
 """Seconds over which contradictions are summed up."""
 
+BENT = 0.5
+"""Radians: a witness who knows his heading no better is no ellipse, and what he hears since moves him anywhere."""
+
 SLOTS = 2
+
+_HEADING = 2
 
 
 class Witnesses:
@@ -75,9 +83,10 @@ class Witnesses:
         self.bank.live[:] = False
 
     def move(self, control: Any, duration: float) -> None:
-        """Move them by a control."""
+        """Move them by a control, and dismiss who has lost his heading."""
         self._expected = None
         self.bank.predict(control, duration)
+        self.bank.live &= self.bank.covariance[:, _HEADING, _HEADING] <= BENT * BENT
         self._contradiction *= math.exp(-duration / MEMORY)
 
     def hear(self, group: int, measured: Measurement) -> None:
