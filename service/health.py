@@ -7,9 +7,11 @@ whether they agree with what was expected (the unnormalised evidence), and how w
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from drivers.sample import SECOND
+from filters.outlier_run import OutlierRun
 from service.estimate import HealthState
 
 CONVERGED_RADIUS = 10.0
@@ -29,6 +31,12 @@ AGREEMENT = 0.5
 
 MEMORY = 3.0
 """Seconds over which that share is averaged, once there are as many."""
+
+OUTLIERS = 0.05
+"""Share of outliers of a sensor that states none."""
+
+DOUBT = 0.02
+"""Probability of a run of outliers, with the belief right, below which it is no accident: the belief is wrong."""
 
 LEAST_READINGS = 10
 """Fewer measurements than this prove nothing, neither for the belief nor against it."""
@@ -52,6 +60,8 @@ class Facts:
         What is done to find a place for a belief that has none, in the user's words; empty when it has one.
     ambiguity : str
         Which places the belief holds, in the user's words, if more than one counts; else empty.
+    elsewhere : str
+        That another place explains the measurements better, in the user's words, if it does; else empty.
     """
 
     now: int
@@ -63,6 +73,7 @@ class Facts:
     delay: int = 0
     searching: str = ""
     ambiguity: str = ""
+    elsewhere: str = ""
 
 
 @dataclass(slots=True)
@@ -82,16 +93,22 @@ class HealthMonitor:
     _last_reading: int | None = None
     _last_kind: str = ""
     _placed: bool = field(default=False)
+    _disputed: bool = field(default=False)
+    _run: OutlierRun = field(default_factory=OutlierRun)
 
-    def measured(self, now: int, kind: str, surprise: float, worth: float = 1.0) -> None:
+    def measured(
+        self, now: int, kind: str, surprise: float, worth: float = 1.0, outliers: float = OUTLIERS
+    ) -> None:
         """Note one absolute measurement: ``surprise`` is the probability, 0…1, that it is the outlier part's.
 
         One that tells what those before it told is ``worth`` the less, 0…1: an outlier seen ten times is one.
+        ``outliers`` is which share of its sensor's readings is said to be.
         """
         self._readings += 1
         elapsed = 0.0 if self._last_reading is None else max(0.0, (now - self._last_reading) / SECOND)
         share = worth * min(1.0, max(1.0 / self._readings, elapsed / MEMORY + 0.02))
         self._surprise += share * (surprise - self._surprise)
+        self._run.observe(surprise, outliers, worth)
         self._last_reading = now
         self._last_kind = kind
 
@@ -101,6 +118,8 @@ class HealthMonitor:
         self._readings = 0
         self._last_reading = None
         self._placed = False
+        self._disputed = False
+        self._run = OutlierRun()
 
     def heard(self, now: int) -> None:
         """Note that an absolute measurement was used, though not by the belief: by the search that placed it."""
@@ -131,15 +150,29 @@ class HealthMonitor:
             return HealthState.DEAD_RECKONING, silent
         if self._readings < LEAST_READINGS:
             return HealthState.CONVERGING, f"{self._readings} measurements so far, too few to tell"
-        limit = AGREEMENT if self.state is HealthState.LOST else DISAGREEMENT
-        if self._surprise > limit:
-            return (
-                HealthState.LOST,
-                f"{self._surprise:.0%} of the measurements of the last {MEMORY:.0f} s disagree with the belief",
-            )
+        disputed = self._dispute(facts)
+        if disputed is not None:
+            return disputed
         if facts.ambiguity:
             return HealthState.AMBIGUOUS, facts.ambiguity
         return self._by_spread(radius, facts.missing)
+
+    def _dispute(self, facts: Facts) -> tuple[HealthState, str] | None:
+        """Say what it means that most measurements disagree: a wrong belief, or nothing but outliers around it."""
+        self._disputed = self._surprise > (AGREEMENT if self._disputed else DISAGREEMENT)
+        if not self._disputed:
+            return None
+        disagree = (
+            f"{self._surprise:.0%} of the measurements of the last {MEMORY:.0f} s disagree with the belief"
+        )
+        if facts.elsewhere:
+            return HealthState.LOST, f"{disagree}; {facts.elsewhere}"
+        if self.state is HealthState.LOST or self._run.log_odds >= -math.log(DOUBT):
+            return HealthState.LOST, disagree
+        outliers = f"{disagree}, and may all be outliers, by the share that was stated"
+        if facts.ambiguity:
+            return HealthState.AMBIGUOUS, f"{facts.ambiguity}; {outliers}"
+        return HealthState.DEAD_RECKONING, outliers
 
     def _silence(self, facts: Facts) -> str | None:
         missing = f"; never heard: {', '.join(facts.missing)}" if facts.missing else ""

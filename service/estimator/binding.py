@@ -25,6 +25,7 @@ from service.estimator.measuring import (
     position_of,
     surroundings_of,
 )
+from service.estimator.measuring.kind import NOMINAL_OUTLIERS
 from service.estimator.start import receiver_name
 
 MAGNETIC_INTERVAL = SECOND // 5
@@ -166,6 +167,7 @@ class BoundSensor:
             TIMING if self.delay > 0 else 0.0,
             self._receiver if lasting > 0.0 and self._leads(sample) else None,
             share,
+            self.settings.outliers or NOMINAL_OUTLIERS,
         )
 
     def _leads(self, sample: Sample) -> bool:

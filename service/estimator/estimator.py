@@ -337,6 +337,7 @@ class Estimator:
             now - self._intake.horizon,
             self._search.status,
             "" if self._tracker is None else self._tracker.ambiguity(),
+            self._search.elsewhere,
         )
         if pose is not None:
             self._search.published(pose.moments)

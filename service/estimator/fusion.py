@@ -313,4 +313,4 @@ class Fusion:
         record.last = time
         record.judge(surprise > OUTLIER)
         if measured.absolute:
-            self._health.measured(time, measured.name, surprise, measured.share)
+            self._health.measured(time, measured.name, surprise, measured.share, measured.outliers)

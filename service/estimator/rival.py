@@ -28,6 +28,9 @@ Columns = dict[str, Array]
 FALSE_ALARM = 1e-9
 """Probability with which one search replaces a belief that is right."""
 
+LIKELY = 1e-3
+"""Probability with which one search finds a place that seems to explain more than a belief that is right."""
+
 LEAST_HEARD = 5
 """Absolute measurements that a rival must have explained before it may win."""
 
@@ -81,10 +84,18 @@ class Rival:
     @property
     def wins(self) -> bool:
         """Whether it has explained enough, and the belief has not."""
+        return self._explains(FALSE_ALARM)
+
+    @property
+    def leads(self) -> bool:
+        """Whether it is likelier than the belief, if not so much so that it replaces that."""
+        return self._explains(LIKELY)
+
+    def _explains(self, false_alarm: float) -> bool:
         return (
             self.heard >= LEAST_HEARD
             and self.surprise >= DISBELIEF * self.heard
-            and self.log_ratio >= -math.log(FALSE_ALARM)
+            and self.log_ratio >= -math.log(false_alarm)
         )
 
     def hopeless(self, time: int) -> bool:

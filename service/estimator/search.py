@@ -255,6 +255,13 @@ class Search:
             return f"searching the area: {absolute} measurements of where the vehicle is so far"
         return ""
 
+    @property
+    def elsewhere(self) -> str:
+        """That another place explains what is measured, in the user's words; empty while none is known that does."""
+        if self.blind or self._rival is None or not self._rival.leads:
+            return ""
+        return f"another place explains the last {self._rival.heard} better"
+
 
 def _reach(measured: Measurement, far: float) -> tuple[float, float, float] | None:
     """Return a square (middle north, east, half a side) that the place of a measurement must lie in, or ``None``."""

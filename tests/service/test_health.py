@@ -85,6 +85,48 @@ def test_is_lost_when_the_measurements_disagree_and_found_when_they_agree() -> N
     assert monitor.judge(facts(now)) is HealthState.TRACKING
 
 
+def clutter(monitor: HealthMonitor, start: float, seconds: float) -> float:
+    """Feed five sights a second that fit nothing, of a sensor of which two fifths do not; return the time after."""
+    steps = round(seconds * 5)
+    for k in range(steps):
+        monitor.measured(
+            round((start + k / 5) * SECOND), "range_bearing/camera", 1.0, worth=0.3, outliers=0.4
+        )
+    return start + steps / 5
+
+
+def test_outliers_that_were_stated_make_nothing_lost() -> None:
+    """Half a minute of other robots: what fits nothing says nothing, so the belief lives on odometry alone."""
+    monitor = HealthMonitor()
+    now = clutter(monitor, agreeing(monitor, 0, 3), 30)
+    assert monitor.judge(facts(now)) is HealthState.DEAD_RECKONING
+    assert "may all be outliers" in monitor.reason
+    several = replace(facts(now), ambiguity="2 hypotheses, 61 % and 39 %, 14 m apart")
+    assert monitor.judge(several) is HealthState.AMBIGUOUS
+    assert "may all be outliers" in monitor.reason
+    assert monitor.reason.startswith(several.ambiguity)
+    now = agreeing(monitor, now, 3)
+    assert monitor.judge(facts(now)) is HealthState.TRACKING
+
+
+def test_outliers_that_another_place_explains_make_it_lost() -> None:
+    """And lost it stays when that place is given up again, until the measurements agree."""
+    monitor = HealthMonitor()
+    now = clutter(monitor, agreeing(monitor, 0, 3), 30)
+    elsewhere = "another place explains the last 8 better"
+    assert monitor.judge(replace(facts(now), elsewhere=elsewhere)) is HealthState.LOST
+    assert monitor.reason.endswith(elsewhere)
+    assert monitor.judge(facts(now)) is HealthState.LOST
+    now = agreeing(monitor, now, 3)
+    assert monitor.judge(replace(facts(now), elsewhere=elsewhere)) is HealthState.TRACKING
+
+
+def test_outliers_for_many_minutes_are_too_many_for_any_share() -> None:
+    monitor = HealthMonitor()
+    now = clutter(monitor, agreeing(monitor, 0, 3), 600)
+    assert monitor.judge(facts(now)) is HealthState.LOST
+
+
 def test_a_single_outlier_changes_nothing() -> None:
     monitor = HealthMonitor()
     now = agreeing(monitor, 0, 5)

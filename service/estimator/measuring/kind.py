@@ -162,6 +162,8 @@ class Measurement(NamedTuple):
         What the lasting error is named after; ``None``: of a speaker that has no state of its own.
     share : float
         The power of its likelihood that it weighs by, of an independent reading.
+    outliers : float
+        Which share of its sensor's readings is said to be outliers.
     """
 
     name: str
@@ -175,6 +177,7 @@ class Measurement(NamedTuple):
     timing: float = 0.0
     receiver: str | None = None
     share: float = 1.0
+    outliers: float = NOMINAL_OUTLIERS
 
     def surprise(self, log_mean: float) -> float:
         """Return the probability, 0…1, that the reading is the outlier part's, given its evidence."""

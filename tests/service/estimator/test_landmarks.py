@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from drivers.sample import AnyReading, Bearing, RangeBearing, Rotation, Sample, Speed
 from service.config import Configuration, ConfigurationError, load
 from service.estimate import Estimate
 from service.estimator import Estimator
 
+Array = NDArray[np.float64]
 SECOND = 1_000_000_000
 MAP = {3: (6.0, 0.0), 4: (0.0, 7.0), 8: (-6.0, -2.0), 11: (1.0, -6.0)}
 SPEED, TURN = 1.0, 0.25
@@ -97,6 +99,73 @@ def test_a_robot_knows_its_place_by_landmarks(
     _, worst, tracking = run(configuration, kind, association == "known", 20.0)
     assert worst < 0.5
     assert tracking > 0.7
+
+
+CLUTTERED = """
+[[sensor]]
+kind = "range_bearing"
+association = "unknown"
+sigma = 0.2
+outliers = 0.4
+[area]
+north = [-10.0, 10.0]
+east = [-10.0, 10.0]
+"""
+
+
+def seen(place: tuple[float, float], pose: tuple[float, float, float], noise: Array) -> RangeBearing:
+    """What stands at ``place``, seen from ``pose`` without a name: distances to 0.2 m, directions to 0.05 rad."""
+    north, east = place[0] - pose[0], place[1] - pose[1]
+    bearing = math.remainder(math.atan2(east, north) - pose[2] + 0.05 * noise[1], math.tau)
+    return RangeBearing(math.hypot(north, east) + 0.2 * noise[0], bearing)
+
+
+def drive_among_robots(folder: Path, seed: int, carried: float) -> list[tuple[float, str, float]]:
+    """Drive for 30 s, return time (s), health and error (m) of each tick.
+
+    From 8 to 18 s nothing is seen but another robot that circles the other way. If ``carried`` is not 0, the robot
+    itself is set down at 8 s, so many seconds ahead on its circle, and sees landmarks only.
+    """
+    configuration = configured(folder, "range_bearing", "unknown", 0.2)
+    text = (folder / "robot.toml").read_text()
+    (folder / "robot.toml").write_text(
+        text.split("[[sensor]]")[0] + CLUTTERED + "[map]" + text.split("[map]")[1]
+    )
+    configuration = load(folder / "robot.toml")
+    random = np.random.default_rng(seed)
+    estimator = Estimator(configuration, seed=seed)
+    told: list[tuple[float, str, float]] = []
+    for tick in range(30 * 25):
+        now, seconds = (100 + tick) * SECOND // 25, tick / 25
+        pose = truth(seconds + (carried if seconds >= 8.0 else 0.0))
+        readings: list[AnyReading] = [Speed(SPEED), Rotation(TURN)]
+        if tick % 5 == 0:
+            place = list(MAP.values())[tick // 5 % len(MAP)]
+            if 8.0 <= seconds < 18.0 and not carried:
+                place = (2.0 * math.cos(0.4 * seconds), -2.0 * math.sin(0.4 * seconds))
+            readings.append(seen(place, pose, random.standard_normal(2)))
+        estimator.ingest(Sample(now, now, "samples", "robot", reading) for reading in readings)
+        estimate = estimator.tick(now, now, 600)
+        told.append((seconds, str(estimate.health.value), error(estimate, pose[0], pose[1])))
+    return told
+
+
+def test_a_robot_that_sees_only_robots_is_not_lost(tmp_path: Path) -> None:
+    """Two fifths of the sights were said to be of no landmark: ten seconds of them are a silence, no contradiction."""
+    told = drive_among_robots(tmp_path, 1, 0.0)
+    assert all(health != "lost" for _, health, _ in told)
+    assert sum(health == "dead_reckoning" for seconds, health, _ in told if 12.0 < seconds < 18.0) > 100
+    assert told[-1][1] == "tracking"
+    assert max(away for _, _, away in told) < 1.0
+
+
+def test_a_robot_that_is_carried_away_among_robots_is_found(tmp_path: Path) -> None:
+    """What it sees then fits another place: within five seconds it trusts its own no more, within twelve it knows."""
+    told = drive_among_robots(tmp_path, 1, 9.0)
+    assert max(away for seconds, _, away in told if seconds < 8.0) < 0.6
+    assert all(health != "tracking" for seconds, health, away in told if seconds > 13.0 and away > 0.6)
+    assert max(away for seconds, _, away in told if seconds > 20.0) < 0.6
+    assert told[-1][1] == "tracking"
 
 
 def test_a_landmark_not_in_the_map_or_without_a_name_is_refused_with_a_reason(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from filters.sensing import Position, PositionMeasurement
 from service.estimator.hearing import Heard
 from service.estimator.measuring import Measurement
-from service.estimator.rival import FALSE_ALARM, LEAST_HEARD, TRIAL, Rival
+from service.estimator.rival import FALSE_ALARM, LEAST_HEARD, LIKELY, TRIAL, Rival
 from service.estimator.way import FreeShape
 
 
@@ -67,6 +67,16 @@ def test_it_wins_by_all_three(readings: int, surprise: float, advantage: float, 
         one.weigh(np.zeros(4), heard(advantage * math.log(FALSE_ALARM) / readings, surprise))
     one.weigh(np.zeros(4), heard(0.0, 1.0, absolute=False))
     assert one.wins is wins
+
+
+def test_it_leads_before_it_wins() -> None:
+    one = rival()
+    for _ in range(LEAST_HEARD):
+        one.weigh(np.zeros(4), heard(1.01 * math.log(LIKELY) / LEAST_HEARD))
+    assert one.leads
+    assert not one.wins
+    one.weigh(np.full(4, math.log(LIKELY)), heard(0.0))
+    assert not one.leads
 
 
 def test_it_is_given_up_for_being_worse_or_late() -> None:
