@@ -30,7 +30,7 @@ from service.estimator.fusion import Fusion
 from service.estimator.ground import GroundVehicle
 from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
-from service.estimator.jumps import Jumps
+from service.estimator.jumps import TRACKS, UNSEEN, Jumps
 from service.estimator.lasting import Lasting
 from service.estimator.latecomers import latecomers_of
 from service.estimator.mode import mode_of
@@ -80,9 +80,9 @@ class Estimator:
         self.configuration = configuration
         self.seed = seed
         self.health = HealthMonitor()
-        self._jumps = Jumps()
         self._stopwatch: Stopwatch = stopwatch or Silent()
         self._vehicle = vehicle_of(configuration)
+        self._jumps = Jumps(TRACKS if self._vehicle.guided else UNSEEN)
         biases = biases_of(configuration)
         self._filter = ParticleFilter(
             self._vehicle.motion,

@@ -3,8 +3,9 @@
 A jump is either done on purpose (the belief begins anew where a search, an order or a witness says; another hypothesis
 leads) or seen in what is published: within about a second the position has moved by more than :data:`FAR` beyond what
 its own velocity says, as when a receiver is back after minutes of dead reckoning. While it tracks it may go as far as
-it said that it may be off: that is what a fix is for. What moves in the wake of a jump belongs to it. A belief that had
-no place yet does not jump when it finds one.
+it said, within that second, that it may be off: that is what a fix is for. Of a vehicle whose way nobody measures that
+holds between two fixes, too: it goes where it is not seen, and a fix within the region that was claimed tells its
+motion. What moves in the wake of a jump belongs to it. A belief that had no place yet does not jump when it finds one.
 """
 
 from __future__ import annotations
@@ -25,9 +26,18 @@ FADING = 1.0
 
 _NO_PLACE = (HealthState.WAITING, HealthState.CONVERGING)
 
+TRACKS = frozenset({HealthState.TRACKING})
+UNSEEN = frozenset({HealthState.TRACKING, HealthState.DEAD_RECKONING})
+"""Healths in which a position may go as far as was claimed: its way measured, or not."""
+
 
 class Jumps:
     """Counts jumps.
+
+    Parameters
+    ----------
+    excused : frozenset of HealthState
+        Healths in which the position may go as far as was claimed.
 
     Attributes
     ----------
@@ -35,8 +45,10 @@ class Jumps:
         The reset counter.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, excused: frozenset[HealthState] = TRACKS) -> None:
         self.steps = 0
+        self._excused = excused
+        self._claimed = 0.0
         self._switches = 0
         self._last = -(2**62)
         self._before: Estimate | None = None
@@ -58,15 +70,16 @@ class Jumps:
         before, self._before = self._before, estimate
         offset = None if before is None or before.health in _NO_PLACE else _offset(before, estimate)
         if before is None or offset is None:
-            self._north = self._east = 0.0
+            self._north = self._east = self._claimed = 0.0
             return
         kept = math.exp(-(estimate.monotonic_ns - before.monotonic_ns) / SECOND / FADING)
         self._north = kept * self._north + offset[0]
         self._east = kept * self._east + offset[1]
-        if before.health is not HealthState.TRACKING:
+        self._claimed = max(kept * self._claimed, before.radius95 or 0.0)
+        if before.health not in self._excused:
             self._untracked = before.monotonic_ns
-        tracks = before.monotonic_ns - self._untracked > WAKE
-        limit = max(FAR, before.radius95 or 0.0) if tracks else FAR
+        excused = before.monotonic_ns - self._untracked > WAKE
+        limit = max(FAR, self._claimed) if excused else FAR
         if math.hypot(self._north, self._east) > limit:
             if estimate.monotonic_ns - self._last > WAKE:
                 self._step(estimate.monotonic_ns)

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from service.estimate import Estimate, HealthState
-from service.estimator.jumps import Jumps
+from service.estimator.jumps import UNSEEN, Jumps
 
 SECOND = 1_000_000_000
 TICK = SECOND // 50
@@ -72,6 +72,26 @@ def test_a_belief_that_tracks_may_go_as_far_as_it_said_and_one_that_reckoned_may
                 )
             )
         assert jumps.steps == expected
+
+
+@pytest.mark.parametrize(("moved", "expected"), [(12.0, 0), (40.0, 1)])
+def test_a_way_that_nobody_measured_ends_at_a_fix_within_what_was_claimed(
+    moved: float, expected: int
+) -> None:
+    """Ten seconds of silence, a region that grows to 20 m, then a fix, and a region of 2 m at once."""
+    jumps = Jumps(UNSEEN)
+    for k in range(700):
+        silent = 100 < k <= 600
+        jumps.spoken(
+            msgspec.structs.replace(
+                BEFORE,
+                monotonic_ns=k * TICK,
+                position=(0.2 * k + moved * (k > 600), 0.0, None),
+                radius95=2.0 + 18.0 * ((k - 100) / 500) if silent else 2.0,
+                health=HealthState.DEAD_RECKONING if k > 150 and silent else HealthState.TRACKING,
+            )
+        )
+    assert jumps.steps == expected
 
 
 def test_a_slow_drift_back_is_none() -> None:
