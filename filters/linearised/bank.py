@@ -26,6 +26,7 @@ from filters.kernels.expectations import (
     expect_velocity,
     expect_wheel_speed,
 )
+from filters.linearised.lateness import look_back_at_place, look_back_at_velocity
 from filters.motion.learned import SlowState
 from filters.motion.unicycle import Unicycle, UnicycleControl
 from filters.sensing import (
@@ -254,6 +255,10 @@ def _expect_position(
     finite = expect_position.direct(
         mean, live, measurement.north, measurement.east, *sensor.lever, sigma_north, sigma_east, *said
     )
+    if finite and sensor.delay is not None:
+        residual, jacobian = said.residual[live], said.jacobian[live]
+        look_back_at_place(sensor, measurement, rows[sensor.delay], mean[live], residual, jacobian)
+        said.residual[live], said.jacobian[live] = residual, jacobian
     return said if finite else None
 
 
@@ -266,6 +271,10 @@ def _expect_velocity(
     finite = expect_velocity.direct(
         mean, live, measurement.north, measurement.east, measurement.speed, scale, sigma, *said
     )
+    if finite and sensor.delay is not None:
+        residual, jacobian = said.residual[live], said.jacobian[live]
+        look_back_at_velocity(sensor, measurement, rows[sensor.delay], scale, mean[live], residual, jacobian)
+        said.residual[live], said.jacobian[live] = residual, jacobian
     return said if finite else None
 
 

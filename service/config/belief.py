@@ -277,7 +277,9 @@ class Honesty(Section):
     trust: bool = True
     """Flag a sensor that disagrees with all others, and ignore it until it has earned trust again."""
     noise_learning: bool = True
-    """Learn how much of the noise that is stated for motion and sensors there really is."""
+    """Learn how much of the noise that is stated for motion and sensors there really is.
+
+    What a position's delay_ms is off by is learned, too."""
     lasting_errors: bool = True
     """Learn the part of a receiver's error that lasts for a minute, beside where the vehicle is."""
     motion_mode: bool = True

@@ -32,6 +32,7 @@ from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
 from service.estimator.jumps import TRACKS, UNSEEN, Jumps
 from service.estimator.lasting import Lasting
+from service.estimator.latency import latency_of
 from service.estimator.latecomers import latecomers_of
 from service.estimator.mode import mode_of
 from service.estimator.output import Output
@@ -134,7 +135,11 @@ class Estimator:
             receivers = Receivers(biases, self._vehicle, self._filter, placed)
             self._fusion.receivers = self._population.receivers = receivers
             self._fusion.companions.append(receivers)
-        lasting = Lasting(receivers)
+        latency = latency_of(configuration, self._vehicle, self._filter)
+        if latency is not None:
+            self._fusion.latency = latency
+            self._fusion.companions.append(latency)
+        lasting = Lasting(receivers, latency)
         self._fusion.companions.append(lasting)
         self._output = Output(
             self._vehicle,

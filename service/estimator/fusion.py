@@ -20,6 +20,7 @@ from service.estimator.deputy import Deputy
 from service.estimator.height import Height
 from service.estimator.intake import Intake, Passed, Waiting
 from service.estimator.latecomers import Latecomers
+from service.estimator.latency import Latency
 from service.estimator.population import Population
 from service.estimator.receivers import Receivers
 from service.estimator.records import SensorRecord
@@ -77,6 +78,8 @@ class Fusion:
         Asked before each measurement whether its sensor is believed; a companion, too.
     caution : Caution or None
         Says what a sensor's readings are worth; a companion, too.
+    latency : Latency or None
+        Takes off fixes what their stated latency is off by; a companion, too.
     receivers : Receivers or None
         Takes what lasts of a receiver's errors for a state; a companion, too.
     latecomers : Latecomers or None
@@ -101,6 +104,7 @@ class Fusion:
         self.search: Search | None = None
         self.trust: Trust | None = None
         self.caution: Caution | None = None
+        self.latency: Latency | None = None
         self.receivers: Receivers | None = None
         self.taken_back = 0
         self.latecomers: Latecomers | None = None
@@ -286,6 +290,8 @@ class Fusion:
 
     def _worth(self, time: int, measured: Measurement) -> Measurement:
         """Return a measurement as the belief is to be weighed by it."""
+        if self.latency is not None:
+            measured = self.latency.punctual(measured)
         if self.receivers is not None and self.receivers.knows(measured) and not self._deputised:
             worth = self.receivers.split(measured)
         else:

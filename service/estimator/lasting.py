@@ -4,8 +4,9 @@ Where the lasting error is no state of the particles (:mod:`service.estimator.re
 errors were new every second. Published is, beside the particles' own spread, the share of the mean that the receiver's
 error of the last minute has, reckoned along with every absolute measurement.
 
-A latency that was stated lasts longer still: it is not known better than to some hundredths of a second, and shifts all
-fixes by as much of the way. So much is the region wider along the velocity.
+A latency that was stated lasts longer still, and shifts all fixes by as much of the way as it is off. It is known to
+some hundredths of a second, or better where the way has told it (:mod:`service.estimator.latency`). So much is the
+region wider along the velocity.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from filters.belief import Evidence
 from filters.consider import LastingError
 from filters.sensing import PositionMeasurement
 from service.estimator.carrier import Pose
+from service.estimator.latency import Latency
 from service.estimator.measuring import Measurement
 from service.estimator.receivers import Receivers
 
@@ -32,8 +34,9 @@ ONE_AXIS = 0.5
 class Lasting:
     """A companion of the estimator: hears every measurement and every stretch, and widens the pose."""
 
-    def __init__(self, receivers: Receivers | None = None) -> None:
+    def __init__(self, receivers: Receivers | None = None, latency: Latency | None = None) -> None:
         self._receivers = receivers
+        self._latency = latency
         self._error = LastingError(DURATION)
         self._variance = 0.0
         self._timing = 0.0
@@ -53,7 +56,7 @@ class Lasting:
             return
         value = measured.value
         if isinstance(value, PositionMeasurement):
-            self._timing = measured.timing
+            self._timing = measured.timing if self._latency is None else self._latency.late(measured).sigma
             gain = self._gain(value.sigma_north or 0.0)
             known = self._receivers is not None and self._receivers.knows(measured)
             if measured.lasting > 0.0 and not known:

@@ -28,8 +28,8 @@ from filters.sensing import (
 from filters.sensing.speed import WheelSpeed, WheelSpeedMeasurement
 
 MOTION = Unicycle(0.1, 0.02, 1e-3, 1e-3, slip_noise=0.05, turn_noise=0.01)
-SLOW = (RandomWalk("range_scale", 1e-3), RandomWalk("range_bias", 1e-3), RandomWalk("heading_bias", 1e-3))
-SIZE = 8
+SLOW = tuple(RandomWalk(name, 1e-3) for name in ("range_scale", "range_bias", "heading_bias", "delay"))
+SIZE = 9
 SENSORS: dict[str, tuple[Any, Callable[[np.random.Generator], Any]]] = {
     "range": (
         Range(0.5, scale="range_scale", bias="range_bias"),
@@ -39,6 +39,18 @@ SENSORS: dict[str, tuple[Any, Callable[[np.random.Generator], Any]]] = {
     "position": (
         Position(1.0, lever=(0.4, -0.2)),
         lambda chance: PositionMeasurement(chance.normal(), chance.normal(), 0.7, 0.9),
+    ),
+    "late position": (
+        Position(1.0, lever=(0.4, -0.2), delay="delay"),
+        lambda chance: PositionMeasurement(chance.normal(), chance.normal(), 0.7, 0.9, 3.0, 0.4),
+    ),
+    "late velocity": (
+        Velocity(0.3, scale="odometry_scale", delay="delay"),
+        lambda chance: VelocityMeasurement(1.4 + 0.1 * chance.normal(), 0.3, 1.5, 0.3, 0.4),
+    ),
+    "plain late velocity": (
+        Velocity(0.3, delay="delay"),
+        lambda chance: VelocityMeasurement(1.4, 0.3, 1.5, 0.2, -0.6),
     ),
     "velocity": (
         Velocity(0.3, scale="odometry_scale"),
@@ -59,8 +71,11 @@ SENSORS: dict[str, tuple[Any, Callable[[np.random.Generator], Any]]] = {
 
 
 def _gaussian(chance: np.random.Generator) -> tuple[Any, Any]:
-    root = chance.normal(size=(SIZE, SIZE)) * np.array([2.0, 2.0, 0.3, 0.01, 0.02, 0.02, 0.1, 0.1])[:, None]
-    mean = chance.normal(size=SIZE) * np.array([3.0, 3.0, 2.0, 0.01, 0.0, 0.0, 0.1, 0.1])
+    root = (
+        chance.normal(size=(SIZE, SIZE))
+        * np.array([2.0, 2.0, 0.3, 0.01, 0.02, 0.02, 0.1, 0.1, 0.05])[:, None]
+    )
+    mean = chance.normal(size=SIZE) * np.array([3.0, 3.0, 2.0, 0.01, 0.0, 0.0, 0.1, 0.1, 0.05])
     mean[4:6] = 1.0
     return mean, root @ root.T
 
