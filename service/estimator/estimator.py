@@ -32,8 +32,8 @@ from service.estimator.hypotheses import Tracker
 from service.estimator.intake import Intake, Passed
 from service.estimator.jumps import TRACKS, UNSEEN, Jumps
 from service.estimator.lasting import Lasting
-from service.estimator.latency import latency_of
 from service.estimator.latecomers import latecomers_of
+from service.estimator.latency import latency_of
 from service.estimator.mode import mode_of
 from service.estimator.output import Output
 from service.estimator.population import Population
