@@ -14,12 +14,20 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
+from typing import cast
 
 import numpy as np
 
 from drivers.sample import SECOND
 from filters.belief import Evidence, Moments
-from filters.sensing import PositionMeasurement, RangeBearingMeasurement, RangeMeasurement
+from filters.kernels.compile import Float32Array
+from filters.sensing import (
+    Bearing,
+    PositionMeasurement,
+    RangeBearing,
+    RangeBearingMeasurement,
+    RangeMeasurement,
+)
 from filters.sensing.biased_range import BiasedRangeMeasurement
 from service.config import Configuration
 from service.estimator.alarm import Alarm
@@ -220,6 +228,21 @@ class Search:
         shape = self._way.shape(rival.moment, [one.time])
         rival.weigh(Likelihood(self._names, [one], shape).log(rival.columns), one)
 
+    def _apart(self, rival: Rival) -> bool:
+        """Say whether more than one thing without a name speaks for a rival."""
+        if not rival.unnamed:
+            return True
+        shape = self._way.shape(rival.moment, [one.time for one, _ in rival.unnamed])
+        best = rival.likeliest
+        poses = shape.poses({name: column[best : best + 1] for name, column in rival.columns.items()})
+        places = zip(*(column[:, 0].tolist() for column in poses), strict=True)
+        return rival.apart(
+            [
+                cast("RangeBearing | Bearing", one.measured.model).place(pose, one.measured.value)
+                for (one, _), pose in zip(rival.unnamed, places, strict=True)
+            ]
+        )
+
     def _drop(self) -> None:
         self._quest = self._rival = None
         self._later = []
@@ -233,7 +256,7 @@ class Search:
         it was before anything was measured, because the motion model keeps its own account of it.
         """
         rival = self._rival
-        if rival is None or not (self.blind or rival.wins):
+        if rival is None or not (self.blind or (rival.wins and self._apart(rival))):
             return None
         generator = np.random.Generator(
             np.random.Philox(key=np.array((self._seed, 2**32 + self.quests), np.uint64))
@@ -258,7 +281,7 @@ class Search:
     @property
     def elsewhere(self) -> str:
         """That another place explains what is measured, in the user's words; empty while none is known that does."""
-        if self.blind or self._rival is None or not self._rival.leads:
+        if self.blind or self._rival is None or not (self._rival.leads and self._apart(self._rival)):
             return ""
         return f"another place explains the last {self._rival.heard} better"
 
@@ -267,9 +290,17 @@ def _reach(measured: Measurement, far: float) -> tuple[float, float, float] | No
     """Return a square (middle north, east, half a side) that the place of a measurement must lie in, or ``None``."""
     value = measured.value
     if isinstance(value, RangeMeasurement | BiasedRangeMeasurement | RangeBearingMeasurement):
+        half = 1.2 * value.distance + 5.0 + far
         if value.north is None or value.east is None:
-            return None
-        return value.north, value.east, 1.2 * value.distance + 5.0 + far
+            return _about(cast(RangeBearing, measured.model).landmarks, half)
+        return value.north, value.east, half
     if isinstance(value, PositionMeasurement):
         return value.north, value.east, 5.0 * (value.sigma_north or 3.0) + 5.0 + far
     return None
+
+
+def _about(landmarks: Float32Array, half: float) -> tuple[float, float, float]:
+    """Return the square that a place must lie in from which any of the ``landmarks`` was seen ``half`` away."""
+    low, high = landmarks.min(axis=0), landmarks.max(axis=0)
+    north, east = map(float, 0.5 * (low + high))
+    return north, east, half + 0.5 * float((high - low).max())

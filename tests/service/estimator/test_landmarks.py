@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -107,9 +108,6 @@ kind = "range_bearing"
 association = "unknown"
 sigma = 0.2
 outliers = 0.4
-[area]
-north = [-10.0, 10.0]
-east = [-10.0, 10.0]
 """
 
 
@@ -120,11 +118,18 @@ def seen(place: tuple[float, float], pose: tuple[float, float, float], noise: Ar
     return RangeBearing(math.hypot(north, east) + 0.2 * noise[0], bearing)
 
 
-def drive_among_robots(folder: Path, seed: int, carried: float) -> list[tuple[float, str, float]]:
+def circling(seconds: float) -> tuple[float, float]:
+    """Where another robot is that circles the other way."""
+    return 2.0 * math.cos(0.4 * seconds), -2.0 * math.sin(0.4 * seconds)
+
+
+def drive_among_robots(
+    folder: Path, seed: int, carried: float = 0.0, other: Callable[[float], tuple[float, float]] = circling
+) -> list[tuple[float, str, float]]:
     """Drive for 30 s, return time (s), health and error (m) of each tick.
 
-    From 8 to 18 s nothing is seen but another robot that circles the other way. If ``carried`` is not 0, the robot
-    itself is set down at 8 s, so many seconds ahead on its circle, and sees landmarks only.
+    From 8 to 18 s nothing is seen but the ``other`` robot. If ``carried`` is not 0, the robot itself is set down at
+    8 s, so many seconds ahead on its circle, and sees landmarks only.
     """
     configuration = configured(folder, "range_bearing", "unknown", 0.2)
     text = (folder / "robot.toml").read_text()
@@ -142,7 +147,7 @@ def drive_among_robots(folder: Path, seed: int, carried: float) -> list[tuple[fl
         if tick % 5 == 0:
             place = list(MAP.values())[tick // 5 % len(MAP)]
             if 8.0 <= seconds < 18.0 and not carried:
-                place = (2.0 * math.cos(0.4 * seconds), -2.0 * math.sin(0.4 * seconds))
+                place = other(seconds)
             readings.append(seen(place, pose, random.standard_normal(2)))
         estimator.ingest(Sample(now, now, "samples", "robot", reading) for reading in readings)
         estimate = estimator.tick(now, now, 600)
@@ -152,16 +157,26 @@ def drive_among_robots(folder: Path, seed: int, carried: float) -> list[tuple[fl
 
 def test_a_robot_that_sees_only_robots_is_not_lost(tmp_path: Path) -> None:
     """Two fifths of the sights were said to be of no landmark: ten seconds of them are a silence, no contradiction."""
-    told = drive_among_robots(tmp_path, 1, 0.0)
+    told = drive_among_robots(tmp_path, 1)
     assert all(health != "lost" for _, health, _ in told)
     assert sum(health == "dead_reckoning" for seconds, health, _ in told if 12.0 < seconds < 18.0) > 100
     assert told[-1][1] == "tracking"
     assert max(away for _, _, away in told) < 1.0
 
 
+@pytest.mark.parametrize(("seed", "north", "east"), [(3, 0.0, 0.0), (4, -7.0, 4.0)])
+def test_a_robot_that_is_parked_where_no_landmark_is_moves_nothing(
+    seed: int, north: float, east: float, tmp_path: Path
+) -> None:
+    """There is a place from which it would be a landmark, all the time: by itself that is no reason to believe it."""
+    told = drive_among_robots(tmp_path, seed, other=lambda _seconds: (north, east))
+    assert max(away for _, _, away in told) < 1.0
+    assert told[-1][1] == "tracking"
+
+
 def test_a_robot_that_is_carried_away_among_robots_is_found(tmp_path: Path) -> None:
     """What it sees then fits another place: within five seconds it trusts its own no more, within twelve it knows."""
-    told = drive_among_robots(tmp_path, 1, 9.0)
+    told = drive_among_robots(tmp_path, 1, carried=9.0)
     assert max(away for seconds, _, away in told if seconds < 8.0) < 0.6
     assert all(health != "tracking" for seconds, health, away in told if seconds > 13.0 and away > 0.6)
     assert max(away for seconds, _, away in told if seconds > 20.0) < 0.6

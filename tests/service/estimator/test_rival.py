@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from filters.sensing import Position, PositionMeasurement
+from filters.sensing import Position, PositionMeasurement, RangeBearing, RangeBearingMeasurement
 from service.estimator.hearing import Heard
 from service.estimator.measuring import Measurement
 from service.estimator.rival import FALSE_ALARM, LEAST_HEARD, LIKELY, TRIAL, Rival
@@ -77,6 +77,28 @@ def test_it_leads_before_it_wins() -> None:
     assert not one.wins
     one.weigh(np.full(4, math.log(LIKELY)), heard(0.0))
     assert not one.leads
+
+
+def sight(log_mean: float) -> Heard:
+    model = RangeBearing(0.2, 0.05, landmarks=[(0.0, 0.0), (9.0, 0.0)])
+    return Heard(
+        0, Measurement("camera", model, RangeBearingMeasurement(3.0, 0.0), True, -9.0, 1.0), log_mean, 1.0
+    )
+
+
+def test_one_thing_without_a_name_is_not_enough() -> None:
+    """Ten sights of 4 nats each: of one landmark, or all but one, they may be of anything; of two in turn, hardly."""
+    one = rival()
+    for _ in range(10):
+        one.weigh(np.array([0.0, -1.0, -1.0, -1.0]), sight(-4.0))
+    assert one.wins
+    assert one.likeliest == 0
+    assert not one.apart(["a"] * 10)
+    assert not one.apart([*["a"] * 9, "b"])
+    assert one.apart(["a", "b"] * 5)
+    named = rival()
+    named.weigh(np.zeros(4), heard(-40.0))
+    assert named.unnamed == []
 
 
 def test_it_is_given_up_for_being_worse_or_late() -> None:
