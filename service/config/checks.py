@@ -30,7 +30,7 @@ NOT_BUILT: dict[tuple[str, str], tuple[frozenset[object], str]] = {
 NOT_READ = (("map", "terrain"), ("map", "occupancy"), ("publish", "ros2_domain"))
 _NOTHING: tuple[object, ...] = ("", -1)
 
-_POINTING = frozenset({"velocity", "heading", "bearing", "range_bearing"})
+_POINTING = frozenset({"heading", "bearing", "range_bearing"})
 """Kinds of measurement that a heading belongs to."""
 
 FILES = (("link", "signing_key_file"), ("link", "dbc"), ("publish", "zenoh"), ("map", "landmarks"))
