@@ -19,7 +19,7 @@ from filters.kalman import Matrix
 from filters.linearised.bank import BATCHED
 from filters.linearised.latency import LATENCY, Late, Lateness
 from filters.particle import ParticleFilter
-from filters.sensing import Position, PositionMeasurement
+from filters.sensing import Position, PositionMeasurement, Velocity
 from service.config import Configuration
 from service.estimator.gaussian import gaussian_of, is_one_place
 from service.estimator.ground import GroundVehicle
@@ -42,13 +42,26 @@ PRUDENCE = 0.5
 class Receiver:
     """One receiver: who learns how late it is, the model of its fixes with that, and what of its error lasts (m²)."""
 
-    def __init__(self, learner: Lateness, model: Position) -> None:
+    def __init__(self, name: str, learner: Lateness, model: Position) -> None:
+        self._link = _link(name)
         self.learner = learner
         self.model = Position(
             model.sigma, outliers=model.outliers, span=model.span, lever=model.lever, delay=LATENCY
         )
         self.claimed = 0.0
         self.witnessed: dict[str, int] = {}
+        self._velocities: dict[str, Velocity] = {}
+
+    def model_of(self, measured: Measurement) -> Any:
+        """Return the model to witness a measurement by: velocities of this receiver are as late as its fixes."""
+        model: object = measured.model
+        if measured.timing <= 0.0 or not isinstance(model, Velocity) or _link(measured.name) != self._link:
+            return model
+        if measured.name not in self._velocities:
+            self._velocities[measured.name] = Velocity(
+                model.sigma, outliers=model.outliers, span=model.span, scale=model.scale, delay=LATENCY
+            )
+        return self._velocities[measured.name]
 
 
 class Latency:
@@ -157,7 +170,7 @@ class Latency:
             if isinstance(measured.model, Position) or not self._is_due(receiver, measured, time):
                 continue
             self._follow()
-            receiver.learner.witness(measured.model, measured.value)
+            receiver.learner.witness(receiver.model_of(measured), measured.value)
 
     def _receiver_of(self, measured: Measurement) -> Receiver | None:
         """Return who says a fix whose stated latency is known only so well; one that is new becomes known."""
@@ -166,7 +179,7 @@ class Latency:
             return None
         if measured.name not in self._receivers:
             learner = Lateness(self._vehicle.motion, self._vehicle.slow_states, measured.timing)
-            self._receivers[measured.name] = Receiver(learner, model)
+            self._receivers[measured.name] = Receiver(measured.name, learner, model)
         return self._receivers[measured.name]
 
     @staticmethod
@@ -175,6 +188,11 @@ class Latency:
             return False
         receiver.witnessed[measured.name] = time
         return True
+
+
+def _link(name: str) -> str:
+    """Return what the name of a measurement has beside its kind."""
+    return name.partition("/")[2]
 
 
 def latency_of(configuration: Configuration, vehicle: Vehicle, belief: ParticleFilter[Any]) -> Latency | None:

@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 from filters.belief import Evidence, Moments
+from filters.linearised.latency import LATENCY, Lateness
 from filters.motion.standing import StandingUnicycle
 from filters.motion.unicycle import UnicycleControl
-from filters.sensing import Position, PositionMeasurement
+from filters.sensing import Position, PositionMeasurement, Velocity
 from service.config import Configuration, validated
 from service.estimator.carrier import Pose
 from service.estimator.ground import GroundVehicle
 from service.estimator.lasting import Lasting
-from service.estimator.latency import Latency, latency_of
+from service.estimator.latency import Latency, Receiver, latency_of
 from service.estimator.measuring import Measurement
 from service.estimator.vehicle import vehicle_of
 from tests.service.estimator.driving import SPEED, STEP, Drive
@@ -103,6 +104,16 @@ def test_of_a_receiver_that_was_not_heard_what_was_stated_holds() -> None:
     assert latency.late(fix(0.0, 0.0)) == (0.0, STATED)
     assert latency.punctual(fix(1.0, 2.0, 2.0)).value.north == 1.0
     assert latency.punctual(fix(1.0, 2.0, 2.0, timing=0.0)).value.north == 1.0
+
+
+def test_velocities_of_the_same_receiver_are_as_late_and_no_others() -> None:
+    receiver = Receiver("position/l", cast(Lateness, None), Position(0.1))
+    late = Measurement("velocity/l", Velocity(0.2, scale="scale"), None, False, 0.0, 1.0, timing=STATED)
+    model = receiver.model_of(late)
+    assert (model.sigma, model.scale, model.delay) == (0.2, "scale", LATENCY)
+    assert receiver.model_of(late) is model
+    for other in (late._replace(timing=0.0), late._replace(name="velocity/m"), fix(0.0, 0.0)):
+        assert receiver.model_of(other) is other.model
 
 
 def test_only_a_stated_latency_of_a_vehicle_with_odometry_is_learned() -> None:
