@@ -23,6 +23,7 @@ from service.config import Configuration
 from service.estimator.gaussian import gaussian_of, is_one_place
 from service.estimator.ground import GroundVehicle
 from service.estimator.measuring import Measurement
+from service.estimator.receivers import Receivers
 from service.estimator.vehicle import Vehicle
 
 NARROW = 3.0
@@ -60,7 +61,8 @@ class Caution:
         self._shares = NoiseShares(vehicle.motion, vehicle.slow_states)
         self._sensors: dict[str, tuple[SensorShare, int]] = {}
         self._checked = 0
-        self._wandering = -(2**62)
+        self._wandering = self._steady = -(2**62)
+        self.receivers: Receivers | None = None
 
     def shown(self, name: str) -> float:
         """Return the share of its stated variance that the sensor ``name`` has shown; 1 where nothing was learned."""
@@ -104,9 +106,14 @@ class Caution:
             self._checked = end
             self._check()
         motion = self._vehicle.motion
-        motion.turn_share = motion.distance_share = 1.0
-        if end - self._wandering > SPAN:
-            motion.turn_share, motion.distance_share = self._shares.reckon()
+        motion.turn_share, motion.distance_share = self._shown_by_motion(end)
+
+    def _shown_by_motion(self, time: int) -> tuple[float, float]:
+        """Return the shares of turn and distance, by whoever can tell them from what a receiver's errors do."""
+        apart = None if self.receivers is None else self.receivers.motion_shares
+        if apart is not None and self._steady <= self._wandering + SPAN:
+            return apart
+        return self._shares.reckon() if time - self._wandering > SPAN else (1.0, 1.0)
 
     def weighed(self, time: int, measured: Measurement, evidence: Evidence, outlier: bool) -> None:
         """Learn from a measurement, which is handed over as it was stated."""
@@ -116,6 +123,8 @@ class Caution:
         if measured.absolute and not measured.independent:
             self._wandering = time
         if measured.independent:
+            if measured.absolute:
+                self._steady = time
             own, heard = self._sensors.get(measured.name, (None, time - SECOND))
             own = SensorShare() if own is None else own
             weight = min(1.0, max(0.0, (time - heard) / SECOND / INDEPENDENT))

@@ -135,6 +135,8 @@ class Estimator:
             receivers = Receivers(biases, self._vehicle, self._filter, placed)
             self._fusion.receivers = self._population.receivers = receivers
             self._fusion.companions.append(receivers)
+            if caution is not None:
+                caution.receivers = receivers
         latency = latency_of(configuration, self._vehicle, self._filter)
         if latency is not None:
             self._fusion.latency = latency

@@ -12,6 +12,7 @@ Without odometry nothing tells such an error from the way the vehicle goes, so f
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -24,6 +25,7 @@ from filters.belief import Evidence
 from filters.kalman import Matrix
 from filters.linearised.bank import BATCHED
 from filters.linearised.error_parts import ErrorParts, Parts
+from filters.linearised.noise_shares import SensorShare
 from filters.motion.learned import Learned
 from filters.particle import ParticleFilter
 from filters.sensing import Position, PositionMeasurement
@@ -41,6 +43,13 @@ FADING = SECOND // 4
 
 GATHERED = SECOND // 4
 """Nanoseconds of driving that those who learn of an error are moved by at once, at most."""
+
+SPACED = 3 * SECOND // 20
+"""Nanoseconds between two readings of another sensor at least that they learn from: of a receiver, every velocity."""
+
+REMEMBERED, DIARY = 5 * SECOND, 7
+"""Every so many nanoseconds what was learned is noted, and so many notes are kept: most liars are found out in half a
+minute."""
 
 NARROW = 6.0
 """Metres: the spread of a belief that Gaussians can stand for."""
@@ -75,6 +84,10 @@ class Receiver:
         What it is made of.
     witnessed : dict[str, int]
         When they heard each other sensor last, nanoseconds.
+    shown : dict[str, SensorShare]
+        What each of these has shown of its variance.
+    diary : deque of float64 arrays
+        What the learner knew at times, the oldest first.
     """
 
     bias: Bias
@@ -84,15 +97,25 @@ class Receiver:
     claim: float = 0.0
     seated: bool = False
     witnessed: dict[str, int] = field(default_factory=dict[str, int])
+    shown: dict[str, SensorShare] = field(default_factory=dict[str, SensorShare])
+    diary: deque[Matrix] = field(default_factory=lambda: deque[Matrix](maxlen=DIARY))
 
     @property
     def variance(self) -> float:
         """Of the part that lasts, m² per axis."""
         return self.parts.lasting * self.claim**2
 
+    def unlearn(self) -> None:
+        """Go back to what was known half a minute ago: the rest was learned from lies."""
+        if self.diary:
+            self.learner.knowledge = self.diary[0]
+            self.parts = self.learner.parts
+            self.diary.clear()
+        self.learner.stop()
+
     def is_due(self, measured: Measurement, time: int) -> bool:
         """Say whether it is time to learn from another sensor again; it never is from another receiver."""
-        if isinstance(measured.model, Position) or time - self.witnessed.get(measured.name, 0) < GATHERED:
+        if isinstance(measured.model, Position) or time - self.witnessed.get(measured.name, 0) < SPACED:
             return False
         self.witnessed[measured.name] = time
         return True
@@ -128,7 +151,7 @@ class Receivers:
         self._gathered = 0
         self._moved: tuple[int, int] | None = None
         self._stood = False
-        self._checked = 0
+        self._checked = self._noted = 0
 
     def of(self, name: str) -> Receiver:
         """Return the receiver of a name.
@@ -191,6 +214,15 @@ class Receivers:
             belief.column(name)[:] = np.float32(gain) * (np.float32(measured) - place)
             variances[name] = (1.0 - gain) * lasting
 
+    @property
+    def motion_shares(self) -> tuple[float, float] | None:
+        """The shares of the stated variances of turn and distance that fixes have shown; ``None`` before the first."""
+        known = [one.learner.motion_shares for one in self._receivers.values() if one.claim > 0.0]
+        if not known:
+            return None
+        turn, distance = zip(*known, strict=True)
+        return sum(turn) / len(known), sum(distance) / len(known)
+
     # --- a companion of the belief --------------------------------------------------------------------------------
 
     def started(self, time: int) -> None:
@@ -216,6 +248,16 @@ class Receivers:
         if end - self._checked >= SECOND:
             self._checked = end
             self._check()
+            self._note(end)
+
+    def _note(self, time: int) -> None:
+        """Note what was learned, now and then."""
+        due = time - self._noted >= REMEMBERED
+        if due:
+            self._noted = time
+        for receiver in self._receivers.values():
+            if receiver.learner.live and (due or not receiver.diary):
+                receiver.diary.append(receiver.learner.knowledge)
 
     def _fade(self) -> None:
         elapsed, self._gathered = self._gathered / SECOND, 0
@@ -269,7 +311,9 @@ class Receivers:
                 receiver.learner.hear(measured.model, measured.value, variance, measured.log_outlier, weight)
             elif receiver.is_due(measured, time):
                 self._follow()
-                receiver.learner.witness(measured.model, measured.value)
+                weight = 0.0 if self._stood else PRUDENCE / measured.repeats
+                own = receiver.shown.setdefault(measured.name, SensorShare())
+                receiver.learner.witness(measured.model, measured.value, measured.log_outlier, weight, own)
 
     # --- who disturbs it ------------------------------------------------------------------------------------------
 
@@ -277,8 +321,8 @@ class Receivers:
         """Forget the error of a receiver that is not believed: when it is believed again it will be another."""
         if self.knows(measured):
             receiver = self.of(measured.receiver or "")
+            receiver.unlearn()
             self._change(receiver, 0.0, receiver.variance)
-            receiver.learner.stop()
 
     @contextmanager
     def kept(self) -> Generator[None]:

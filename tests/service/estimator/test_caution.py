@@ -13,6 +13,7 @@ from service.config.reading import validated
 from service.estimator.caution import Caution, caution_of
 from service.estimator.ground import GroundVehicle
 from service.estimator.measuring import Measurement
+from service.estimator.receivers import Receivers
 from service.estimator.vehicle import vehicle_of
 from tests.service.estimator.driving import STEP, Drive
 
@@ -65,6 +66,27 @@ def test_while_errors_wander_what_was_stated_holds() -> None:
     assert drive.motion.turn_share == 1.0
     assert drive.motion.distance_share == 1.0
     assert caution.shown("range/bus/0") == 1.0
+
+
+class Apart:
+    """Who tells motion and wandering errors apart."""
+
+    motion_shares = (0.05, 0.5)
+
+
+def test_while_errors_wander_those_who_know_them_apart_say_what_the_motion_has_shown() -> None:
+    """A minute of ranges whose errors wander: the receivers' word counts, and goes on to when nothing is heard."""
+    caution, drive = followed(5.0, independent=False)
+    caution.receivers = cast(Receivers, Apart())
+    for _ in range(3):
+        caution.moved(*drive.step())
+        assert (drive.motion.turn_share, drive.motion.distance_share) == Apart.motion_shares
+    for _ in range(int(12.0 / STEP)):
+        caution.moved(*drive.step())
+    assert (drive.motion.turn_share, drive.motion.distance_share) == Apart.motion_shares
+    caution.weighed(drive.now, drive.range(0)._replace(independent=True), drive.weigh(drive.range(0)), False)
+    caution.moved(*drive.step())
+    assert (drive.motion.turn_share, drive.motion.distance_share) != Apart.motion_shares
 
 
 def test_a_sensor_is_not_judged_while_the_vehicle_stands() -> None:

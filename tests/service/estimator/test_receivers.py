@@ -175,3 +175,26 @@ def test_those_who_learn_begin_with_a_narrow_belief_and_end_with_it() -> None:
     belief.column("heading")[:] = np.linspace(-3.0, 3.0, COUNT)
     receivers.moved(4 * SECOND, 6 * SECOND)
     assert not learner.live
+
+
+def test_what_a_liar_has_taught_is_unlearned() -> None:
+    """Ten seconds of fixes that run away: what is known is what was known before, but for what time has taken."""
+    receivers, _ = belief_at(0.5)
+    assert receivers.motion_shares is None
+    receivers.started(0)
+    receivers.split(fix(0.0))
+    receiver = receivers.of(NAME)
+    fresh = receiver.learner.parts
+    receivers.moved(0, 2 * SECOND)
+    for second in range(2, 12):
+        receivers.moved(second * SECOND, (second + 1) * SECOND)
+        runaway = fix(4.0 * second)
+        receivers.weighed((second + 1) * SECOND, runaway, Evidence(0.0, 0.0, True), False)
+    poisoned = receiver.learner.parts
+    assert abs(math.log(poisoned.fresh / fresh.fresh)) > 1.0
+    receivers.distrusted(fix(48.0))
+    assert receiver.parts == receiver.learner.parts
+    assert receiver.parts.lasting == pytest.approx(fresh.lasting, rel=0.05)
+    assert receiver.parts.fresh == pytest.approx(fresh.fresh, rel=0.05)
+    assert not receiver.learner.live
+    assert receivers.motion_shares == receiver.learner.motion_shares
