@@ -23,6 +23,7 @@ from filters.crew import ALIGNMENT, Crew
 from filters.duration import require_duration
 from filters.kernels import evidence, random
 from filters.kernels.compile import Float32Array
+from filters.loosening import loosen
 from filters.motion.learned import Learned, SlowState
 from filters.motion.model import Drawing, Motion, Reopening
 from filters.motion.slow import RandomWalk, diffuse
@@ -31,7 +32,7 @@ from filters.particle_belief import EVIDENCE_SAMPLE, TOGETHER
 from filters.particle_checks import check_start
 from filters.particle_redrawing import NOBODY, RedrawnBelief
 from filters.particle_set import ParticleSet
-from filters.reopening import reopen
+from filters.reopening import CIRCLE, reopen
 from filters.sensing.model import Account, Batch, Learner, Sensor
 
 __all__ = ["EVIDENCE_SAMPLE", "NOBODY", "ParticleFilter"]
@@ -45,6 +46,8 @@ _PACKERS = {number: struct.Struct(f"{8 * number}d") for number in range(2, TOGET
 _new = cast(Any, tuple.__new__)  # as the constructors make named tuples, without their calls in Python
 
 _REOPENING_STREAM = 5 << 32
+_LOOSENING_STREAM = 7 << 32
+_HEADING = 2
 
 _REFUSED = Evidence(math.nan, math.nan, accepted=False)
 
@@ -302,7 +305,7 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         return constants[0]
 
     def reopen(self, effective_sample_size: float) -> None:
-        """Open slow states again after a resampling, so that they do not freeze at few ancestors' values.
+        """Open headings and slow states after a resampling, so that they do not freeze at few ancestors' values.
 
         Those that the motion marginalises get a wider variance, those that are sampled are drawn apart; those that a
         sensor learns stay. Mean, covariance with the pose and variance of each stay what they were
@@ -316,6 +319,7 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
         motion = self._reopening
         if motion is None:
             return
+        self._loosen(effective_sample_size)
         names = list(motion.conditional_variances)
         rows = [self._particles.row(name) for name in (*names, *self._sampled_states)]
         columns, count = self._particles.columns, self.count
@@ -331,6 +335,21 @@ class ParticleFilter(RedrawnBelief, Generic[Control]):
             for first, last in self._blocks.pairs:
                 self._normal_pairs(first, last, step, key, self._noises[0], 0)
                 diffuse(columns, row, first, last, self._noises[0], 0, math.sqrt(variance))
+
+    def _loosen(self, effective_sample_size: float) -> None:
+        """Draw the headings apart (:mod:`filters.loosening`)."""
+        columns, count = self._particles.columns, self.count
+        heading = columns[_HEADING, :count]
+        others = np.delete(columns[:, :count], _HEADING, axis=0)
+        loosened = loosen(heading, others, effective_sample_size)
+        if loosened is None:
+            return
+        heading -= loosened[0]
+        key, sigma = random.key(self._seed, _LOOSENING_STREAM), math.sqrt(loosened[1])
+        for first, last in self._blocks.pairs:
+            self._normal_pairs(first, last, self._draws & 0xFFFFFFFF, key, self._noises[0], 0)
+            diffuse(columns, _HEADING, first, last, self._noises[0], 0, sigma)
+        heading -= CIRCLE * np.floor((heading + 0.5 * CIRCLE) / CIRCLE)
 
     def _given_path(self) -> Mapping[str, float]:
         variances = self._motion.conditional_variances

@@ -89,7 +89,8 @@ def test_a_filter_s_slow_states_keep_their_variance() -> None:
     belief.reopen(COUNT / 2)
     after = belief.moments()
     assert np.allclose(after.mean, before.mean, rtol=1e-4, atol=1e-4)
-    assert np.allclose(after.variance, before.variance, rtol=1e-3)
+    slow = [after.names.index(name) for name in (GYRO_BIAS, ODOMETRY_SCALE)]
+    assert np.allclose(after.variance[slow], before.variance[slow], rtol=1e-3)
     assert motion.conditional_variances[GYRO_BIAS] > 1.05 * left_open[GYRO_BIAS]
     assert motion.conditional_variances[ODOMETRY_SCALE] > 1.05 * left_open[ODOMETRY_SCALE]
 
