@@ -176,6 +176,15 @@ class Hypotheses:
         quotas[rest] += 1
         return quotas
 
+    def worths(self, weights: Float32Array, count: int) -> dict[int, float]:
+        """Return how many particles are effective of each hypothesis's (equation 4.36's measure), by label."""
+        labels, given = self.labels[:count], weights[:count].astype(np.float64)
+        sums = np.bincount(labels, given, self._most + 1)
+        squares = np.bincount(labels, given * given, self._most + 1)
+        return {
+            label: float(sums[label] ** 2 / squares[label]) for label in self._slots if squares[label] > 0.0
+        }
+
     def moments(
         self,
         columns: Float32Array,

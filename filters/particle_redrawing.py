@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from filters import strata
+from filters.apart import drawn_apart
 from filters.crew import ALIGNMENT, Crew
 from filters.kernels import random, resampling
 from filters.kernels.compile import Float32Array, Int32Array
@@ -27,6 +28,7 @@ _RESAMPLING_STREAM = 1 << 32
 _INJECTION_STREAM = 2 << 32
 _KERNEL_STREAM = 3 << 32
 _REJUVENATION_STREAM = 4 << 32
+_APART_STREAM = 6 << 32
 
 NOBODY = -1
 """Ancestor of a particle that was injected."""
@@ -175,6 +177,32 @@ class RedrawnBelief(ParticleBelief):
         self._top = None
         self._log_sum = self._log_sum_of(log_weights, self._sampled, self._stride, self._samples[0])
         self.normalize()
+
+    def draw_apart(self, labels: Int32Array, worths: Mapping[int, float], widest: float) -> None:
+        """Draw the copies of every label apart, whose mean and covariance stay (:func:`~filters.apart.drawn_apart`).
+
+        Every call uses new random numbers only after another resampling. Weights and lineages stay.
+
+        Parameters
+        ----------
+        labels : (capacity,) int32
+            Of each particle.
+        worths : mapping of int to float
+            Whose copies, and how many particles were effective among the label's before they were resampled.
+        widest : float
+            Metres; the standard deviation north or east up to which a label's are one place. Others stay.
+        """
+        columns, count = self._particles.columns, self.count
+        rows = len(self.names)
+        normals = np.empty((rows + rows % 2, count), np.float32)
+        for row in range(0, rows, 2):
+            key = random.key(self._seed, _APART_STREAM + row)
+            random.normal_pairs.direct(0, count, self._draws & 0xFFFFFFFF, key, normals, row)
+        for label, worth in worths.items():
+            places = np.flatnonzero(labels[:count] == label)
+            drawn = drawn_apart(columns[:rows, places], normals[:rows, places], max(1.0, worth), widest)
+            if drawn is not None:
+                columns[:rows, places] = drawn
 
     def _lay_out(self, ancestors: Int32Array) -> None:
         """Put the copies in the place of the particles."""

@@ -116,10 +116,12 @@ class Tracker:
             self._parted |= hypotheses.count > count
 
     def draw(self, count: int) -> None:
-        """Resample by hypothesis, ``count`` particles in all."""
+        """Resample by hypothesis, ``count`` particles in all, and draw the copies of each apart."""
         belief, hypotheses = self._belief, self._hypotheses
         quotas = hypotheses.quotas(belief.weights, belief.count, count)
+        worths = hypotheses.worths(belief.weights, belief.count)
         belief.resample_by_label(hypotheses.labels, quotas)
+        belief.draw_apart(hypotheses.labels, worths, RESOLUTION)
 
     # --- what is published ----------------------------------------------------------------------------------------
 
