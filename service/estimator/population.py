@@ -93,7 +93,7 @@ class Population:
         """
         belief = self._belief
         belief.normalize()
-        wear = Wear(belief.count, belief.effective_sample_size, 0.0 if self._divided else self.still())
+        wear = Wear(belief.count, belief.effective_sample_size, self.still())
         if RESAMPLING.due(wear):
             collapsed = COLLAPSED.due(wear)
             if collapsed:
@@ -103,11 +103,6 @@ class Population:
                 with nullcontext() if self.receivers is None else self.receivers.kept():
                     belief.rejuvenate(HEADING_BIN / POSITION_BIN)
         self._stopwatch.lap("resampling")
-
-    @property
-    def _divided(self) -> bool:
-        """Whether copies are drawn apart, by hypothesis: then resampling forgets nothing while nothing moves."""
-        return self.tracker is not None and self.tracker.divided
 
     def resample(self, afforded: int) -> None:
         """Draw as many particles as are demanded and afforded.
