@@ -174,7 +174,7 @@ ROWS = (
     ),
     Row("ubc_mission1, against its fixes", (TELEMETRY,), ("replay", *TELEMETRY_FILES), prepare_telemetry),
     Row(
-        "ubc_mission1, GNSS blanked from 400 to 460 s",
+        "ubc_mission1, against its fixes, blanked from 400 to 460 s",
         (TELEMETRY,),
         ("replay", *TELEMETRY_FILES, "--blank", "GPS_RAW_INT:400-460"),
         prepare_telemetry,

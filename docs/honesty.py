@@ -46,6 +46,9 @@ LIED_TO = ("kidnap",)
 TRIMMED = "trimmed"
 """Copies of a recording: they have their row, but do not count in the mean once more."""
 
+AGAINST = "against"
+"""Rows whose truth is none: it was made of what the belief hears, and so has part of its errors."""
+
 MARGIN = 4.0
 """Points by which observed may differ from claimed."""
 
@@ -88,9 +91,14 @@ def curve(levels: list[int]) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(counts) / counts.sum()])
 
 
-def counts(name: str) -> bool:
-    """Say whether a row counts in the mean: nobody lied to it, and it is no copy."""
+def once(name: str) -> bool:
+    """Say whether nobody lied to a row, and it is no copy of another."""
     return name not in LIED_TO and TRIMMED not in name
+
+
+def counts(name: str) -> bool:
+    """Say whether a row counts in the mean: its truth is one, too."""
+    return once(name) and AGAINST not in name
 
 
 def curves(kept: dict[str, Any], part: str) -> dict[str, np.ndarray]:
@@ -158,12 +166,14 @@ def calibration(kept: dict[str, Any]) -> str:
     head = ("", "50 %", "95 %", "99 %", "NEES", "its bounds", "log score", "RMSE, m", "checks", "command")
     lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
     every: list[np.ndarray] = []
+    true: list[np.ndarray] = []
     for part in ("scenarios", "recordings"):
         for name, one in kept.get(part, {}).items():
             if not one["levels"]:
                 continue
             observed = curve(one["levels"])
-            every += [observed] if counts(name) else []
+            every += [observed] if once(name) else []
+            true += [observed] if counts(name) else []
             low, high = one["nees_bounds"]
             cells = (
                 f"scenario `{name}`" if part == "scenarios" else name,
@@ -176,15 +186,19 @@ def calibration(kept: dict[str, Any]) -> str:
                 f"`{one['command']}`",
             )
             lines.append(f"| {' | '.join(cells)} |")
-    if every:
-        mean = np.mean(every, axis=0)
-        cells = (
-            f"mean of these {len(every)}",
-            *(f"{100.0 * mean[level]:.1f} %" for level in (50, 95, 99)),
-            *("",) * 6,
-        )
-        lines.append(f"| {' | '.join(cells)} |")
+    lines += [mean_row(f"mean of the {len(true)} that count", true)] if true else []
+    lines += (
+        [mean_row(f"mean of {len(every)}, with those against a copy", every)]
+        if len(every) > len(true)
+        else []
+    )
     return "\n".join(lines)
+
+
+def mean_row(name: str, observed: list[np.ndarray]) -> str:
+    """Return the line of the mean of some curves."""
+    mean = np.mean(observed, axis=0)
+    return f"| {name} | {' | '.join(f'{100.0 * mean[level]:.1f} %' for level in (50, 95, 99))} |{' |' * 6}"
 
 
 def passed(one: dict[str, Any]) -> str:
