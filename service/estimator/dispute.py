@@ -37,6 +37,9 @@ MEMORY = 120.0
 """Seconds after which a variance is down to 1 / e: a receiver that was off by so much may be so again, and a witness
 that began since knows nothing of it."""
 
+ALONE = 10.0
+"""Seconds for which way and receiver must agree with each other and not with the belief before they are believed."""
+
 
 class Dispute:
     """What is left of the disagreements of the last minutes.
@@ -53,6 +56,7 @@ class Dispute:
         self.variance = 0.0
         self.held: Matrix = np.zeros((2, 2))
         self._heard: dict[str, int] = {}
+        self._forsaken = 0.0
 
     def wait(self, seconds: float) -> None:
         """Let time pass."""
@@ -61,6 +65,7 @@ class Dispute:
     def settle(self) -> None:
         """Forget it: who was wrong has been decided."""
         self.held[:] = 0.0
+        self._forsaken = 0.0
 
     def hear(self, away: Matrix, spread: Matrix) -> None:
         """Take a disagreement in, where it is larger than what is held.
@@ -78,6 +83,29 @@ class Dispute:
         share = 1.0 - USUAL / square
         if share * float(away @ away) > float(np.trace(self.held)):
             self.held = share * (np.outer(away, away) + spread)
+
+    def forsaken(self, away: Matrix, fix: Matrix, spread: Matrix, seconds: float) -> bool:
+        """Say whether way and receiver have agreed for a while where the vehicle is, and that it is not there.
+
+        Then it is the belief that is wrong, whoever led it there: to go on by the way would keep it wrong for ever.
+
+        Parameters
+        ----------
+        away : (2,) float64
+            Of the belief from what uses less, metres.
+        fix : (2,) float64
+            Of the receiver's fix from it, metres.
+        spread : (2, 2) float64
+            Covariance of both, square metres.
+        seconds : float
+            Since the fix before.
+        """
+        belief, receiver, between = (
+            float(one @ np.linalg.solve(spread, one)) for one in (away, fix, away - fix)
+        )
+        wrong = receiver <= USUAL < min(belief, between)
+        self._forsaken = self._forsaken + seconds if wrong else 0.0
+        return self._forsaken >= ALONE
 
     def sized(self, time: int, measured: Measurement) -> Measurement:
         """Return a receiver's reading with the variance of one whose error lasts, as far as it is disputed."""

@@ -299,6 +299,13 @@ class Estimator:
             return
         self._search.work(self._fusion.time)
         found = self._search.found(self._fusion.time, self._population.clamp(START_COUNT, afforded))
+        if (
+            found is not None
+            and not blind
+            and self._trust is not None
+            and self._trust.refutes(found["heading"])
+        ):
+            self._left_since, found = self._fusion.time, None
         if found is not None:
             self._filter.initialize(found)
             with self._trust.unmoved() if self._trust is not None else nullcontext():

@@ -127,8 +127,9 @@ class Group:
 
     @property
     def agreed(self) -> bool:
-        """Whether one of it has ever earned trust."""
-        return any(sensor.agreed for sensor in self.sensors.values())
+        """Whether one of it that says where the vehicle is has ever earned trust, or, where none does, any of it."""
+        leading = [sensor.agreed for sensor in self.sensors.values() if sensor.absolute]
+        return any(leading) if leading else any(sensor.agreed for sensor in self.sensors.values())
 
 
 def group_of(name: str, sample: Sample) -> str:

@@ -91,6 +91,11 @@ STRAYED = 0.2
 PLACED = 5.0
 """Metres: a belief with less spread than this is one place, and makes a witness."""
 
+TURNED = 16.0
+"""Squared difference of two headings, in the witness's own measure, that no way explains."""
+
+_HEADING = 2
+
 
 class Trust:
     """Who is believed; a :class:`~service.estimator.companion.Companion` that is also asked before each measurement.
@@ -169,10 +174,38 @@ class Trust:
         """Whether somebody who says where the vehicle is has been caught, or may soon be."""
         odds = self._odds.log_odds
         sensors = [sensor for group in self._groups.values() for sensor in group.sensors.values()]
-        return any(sensor.absolute and odds[sensor.place] < CALM for sensor in sensors)
+        return any(sensor.absolute and sensor.agreed and odds[sensor.place] < CALM for sensor in sensors)
 
-    def _dispute(self, group: Group, sensor: Judged) -> None:
-        """Note where the belief is away from what an older witness of a receiver says, if he has not lost his way."""
+    def refutes(self, headings: Matrix) -> bool:
+        """Say whether it :attr:`decides`, and by its witness the vehicle cannot head as a search found.
+
+        Fixes of a while ago, or that stand still, fit another way than the one that was driven, turned about.
+
+        Parameters
+        ----------
+        headings : (n,)
+            Radians, equally likely.
+        """
+        found = math.atan2(float(np.sin(headings).mean()), float(np.cos(headings).mean()))
+        return self.decides and any(
+            self._cannot_head(found, group)
+            for group in self._groups.values()
+            if group.absolute and group.agreed and self._accuses(group)
+        )
+
+    def _cannot_head(self, heading: float, group: Group) -> bool:
+        member = self._witnesses.judging(group.place)
+        if member is None:
+            return False
+        mean, covariance = self._witnesses.gaussian(member)
+        away = math.remainder(heading - float(mean[_HEADING]), math.tau)
+        return away * away > TURNED * float(covariance[_HEADING, _HEADING])
+
+    def _dispute(self, group: Group, sensor: Judged, eldest: Testimony, weight: float) -> None:
+        """Note where the belief is away from what an older witness of a receiver says, if he has not lost his way.
+
+        One that has never agreed with the belief disputes nothing: what it says is for the search to explain.
+        """
         moments = self._belief.moments()
         self.dispute.variance = 0.5 * float(moments.variance[0] + moments.variance[1])
         member = self._witnesses.judging(group.place)
@@ -180,7 +213,11 @@ class Trust:
             return
         mean, covariance = self._witnesses.gaussian(member)
         spread = max(LEAST_CAUTION, sensor.level.caution) * covariance[:2, :2]
-        self.dispute.hear(moments.mean[:2] - mean[:2], spread)
+        away = moments.mean[:2] - mean[:2]
+        self.dispute.hear(away, spread)
+        if self.dispute.forsaken(away, eldest.residual, spread + np.diag(eldest.noise), weight):
+            self._undo = mean, covariance
+            self.dispute.settle()
 
     def _alone(self, group: Group) -> bool:
         """Say whether a group contradicts what all others say, and they do not contradict each other."""
@@ -260,8 +297,8 @@ class Trust:
             sensor.compare(opinion, weight)
             self._judge(group, sensor, opinion, next(iter(said.values())).testimony, weight)
             group.lie.hear(time, opinion.testimony, weight, sensor.absolute)
-            if sensor.absolute and not sensor.ranging and not sensor.flagged:
-                self._dispute(group, sensor)
+            if sensor.absolute and sensor.agreed and not sensor.ranging and not sensor.flagged:
+                self._dispute(group, sensor, next(iter(said.values())).testimony, weight)
         return group.believes(sensor)
 
     def believes(self, sample: Sample, measured: Measurement) -> bool:
@@ -313,6 +350,8 @@ class Trust:
             together = opinion.information(TOGETHER) - opinion.surprise
             verdict = min(verdict, together - group.support(sensor.heard or 0))
         sensor.remember(eldest, verdict > 0.0 and not sensor.flagged)
+        if verdict < 0.0 and not sensor.agreed:
+            self._odds.log_odds[sensor.place] = 0.0
         if verdict < 0.0 and not (sensor.agreed and self._accuses(group)):
             return
         self._odds.add(weight * min(BEST, max(sensor.worst, verdict)), sensor.place)
@@ -320,9 +359,11 @@ class Trust:
         sensor.agreed |= odds >= CALM
         if sensor.flagged:
             sensor.flagged = odds < EARNED
+            self._witnesses.keep(group.place, group.flagged)
             self._due = self._time
         elif odds <= FLAGGED:
             sensor.flagged = True
+            self._witnesses.keep(group.place, group.flagged)
             self._due = self._time
             sensor.lessons.clear()
             group.lie.begin()

@@ -70,6 +70,7 @@ class Witnesses:
         self._began = [0] * (SLOTS * groups)
         self._contradiction: Matrix = np.zeros(SLOTS * groups)
         self._wildness: Matrix = np.zeros(SLOTS * groups)
+        self._kept: NDArray[np.bool_] = np.zeros(SLOTS * groups, np.bool_)
         self._expected: tuple[Measurement, Expectations] | None = None
 
     @staticmethod
@@ -77,16 +78,20 @@ class Witnesses:
         """Strike a group's witnesses from flags of who is live."""
         live[SLOTS * group : SLOTS * (group + 1)] = False
 
+    def keep(self, group: int, kept: bool) -> None:
+        """Keep a group's witnesses whatever they know of their heading: of one that was caught none other may begin."""
+        self._kept[SLOTS * group : SLOTS * (group + 1)] = kept
+
     def clear(self) -> None:
         """Dismiss all of them."""
         self._expected = None
         self.bank.live[:] = False
 
     def move(self, control: Any, duration: float) -> None:
-        """Move them by a control, and dismiss who has lost his heading."""
+        """Move them by a control, and dismiss who has lost his heading, but for those that are kept."""
         self._expected = None
         self.bank.predict(control, duration)
-        self.bank.live &= self.bank.covariance[:, _HEADING, _HEADING] <= BENT * BENT
+        self.bank.live &= (self.bank.covariance[:, _HEADING, _HEADING] <= BENT * BENT) | self._kept
         self._contradiction *= math.exp(-duration / MEMORY)
 
     def hear(self, group: int, measured: Measurement) -> None:

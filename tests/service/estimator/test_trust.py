@@ -206,6 +206,58 @@ def test_a_young_belief_has_its_witnesses_begin_anew_soon_and_then_ever_later(
     assert began == pytest.approx([0.2, 5.2, 10.4, 20.8, 41.6, 83.2, 143.2, 203.2], abs=0.5)
 
 
+def test_who_jumps_about_has_not_agreed_however_often_it_stays_for_a_while() -> None:
+    """Every four seconds elsewhere from the first fix on; each stay agrees with a belief that has followed it."""
+
+    def measure(drive: Drive) -> list[Measurement]:
+        place = int(drive.time / 4.0) % 8
+        away = (90.0 * (place % 3), 70.0 * (place % 5)) if place % 2 else (0.0, 0.0)
+        return [drive.position(away)]
+
+    trust, flags = judged(Drive(seed=14), 60.0, measure)
+    assert flags == []
+    assert trust.log_odds("position/bus") is None
+    assert not trust.suspects
+    assert not trust.decides
+
+
+def test_no_search_turns_a_vehicle_about_whose_heading_a_witness_knows() -> None:
+    drive = Drive(seed=16)
+    trust, _ = judged(drive, 40.0, lambda drive: [drive.position()])
+    heading = float(drive.truth[2])
+    chance = np.random.default_rng(16)
+    assert trust.decides
+    assert not trust.refutes(heading + 0.05 * chance.standard_normal(500))
+    assert trust.refutes(heading + 2.0 + 0.05 * chance.standard_normal(500))
+    stranger, _ = judged(Drive(seed=17), 40.0, lambda drive: [drive.position((2000.0, 0.0))])
+    assert not stranger.refutes(heading + 2.0 + 0.05 * chance.standard_normal(500))
+
+
+def test_a_belief_that_way_and_receiver_refute_begins_anew_as_the_way_has_it() -> None:
+    """Something has put the belief 12 m away; the receiver is honest and the witness knows better."""
+    drive = Drive(seed=18)
+    trust, _ = judged(drive, 60.0, lambda drive: [drive.position()])
+    with trust.unmoved():
+        trust.started(drive.now)
+    names = drive.belief.names
+    columns = {name: drive.belief.columns[row, :400].copy() for row, name in enumerate(names)}
+    columns["north"] += 12.0
+    drive.belief.inject(columns)
+    taken = 0
+    while drive.time < 90.0 and not taken:
+        start, end = drive.step()
+        drive.belief.predict(drive.control(start, end), STEP)
+        trust.moved(start, end)
+        assert trust.admits(end, drive.sample(), drive.position())
+        particles = trust.take_back()
+        if particles is not None:
+            drive.belief.inject(particles)
+            taken += 1
+    assert 70.0 <= drive.time <= 75.0
+    assert drive.error < 4.0
+    assert not trust.dispute.held.any()
+
+
 def test_same_seed_same_particles() -> None:
     def measure(drive: Drive) -> list[Measurement]:
         return [drive.position((max(0.0, drive.time - 70.0), 0.0))]

@@ -76,3 +76,14 @@ def test_who_knows_his_heading_stays() -> None:
     assert witnesses.judging(0) == 1
     witnesses.move(UnicycleControl(0.0, 0.0, 0.0, 0.4), STEP)
     assert witnesses.judging(0) is None
+
+
+def test_whose_group_was_caught_stays_for_he_alone_can_forgive() -> None:
+    witnesses = Witnesses(Drive().motion, [], 1)
+    witnesses.begin([0], SECOND, np.zeros(5), np.diag([0.1, 0.1, 0.01, 1e-6, 1e-4]))
+    witnesses.keep(0, True)
+    witnesses.move(UnicycleControl(0.0, 0.0, 0.0, 0.9), STEP)
+    assert witnesses.judging(0) == 0
+    witnesses.keep(0, False)
+    witnesses.move(UnicycleControl(0.0, 0.0, 0.0, 0.0), STEP)
+    assert witnesses.judging(0) is None
