@@ -1,7 +1,8 @@
 """A belief as one Gaussian: whether it is near enough to one, and which.
 
 The banks of Kalman filters that go along with the particles (:mod:`service.estimator.witnesses`,
-:mod:`service.estimator.mode`, :mod:`service.estimator.caution`, :mod:`service.estimator.receivers`) begin as it.
+:mod:`service.estimator.mode`, :mod:`service.estimator.caution`, :mod:`service.estimator.receivers`,
+:mod:`service.estimator.latency`) begin as it.
 """
 
 from __future__ import annotations
