@@ -67,8 +67,8 @@ def draw(seed: int) -> Scenario:
             "slip_noise": 0.02,
             # the gyro has 2e-4: by the default of the configuration it would be a hundred times as much, and five
             # minutes of dead reckoning teach nobody better
-            "yaw_rate_noise": 5e-4,
-            "turn_noise": 1e-3,
+            "yaw_rate_noise": 0.005,
+            "turn_noise": 0.005,
             "gyro_bias_walk": 1e-4,
             "gyro_bias_sigma": 0.006,
             "odometry_scale_sigma": 0.02,
