@@ -48,6 +48,7 @@ format: $(INSTALLED) ## let ruff rewrite the sources
 bench: install ## what this machine affords, and how the loop keeps its deadlines
 	$(BIN)/python benchmarks/step.py --models
 	$(BIN)/python benchmarks/afford.py
+	$(BIN)/python benchmarks/mechanisms.py
 	$(BIN)/python benchmarks/compare.py
 	$(BIN)/python benchmarks/saturation.py
 	$(BIN)/python benchmarks/memory.py
