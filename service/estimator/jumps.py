@@ -5,7 +5,8 @@ leads) or seen in what is published: within about a second the position has move
 its own velocity says, as when a receiver is back after minutes of dead reckoning. While it tracks it may go as far as
 it said, within that second, that it may be off: that is what a fix is for. Of a vehicle whose way nobody measures that
 holds between two fixes, too: it goes where it is not seen, and a fix within the region that was claimed tells its
-motion. What moves in the wake of a jump belongs to it. A belief that had no place yet does not jump when it finds one.
+motion. What moves in the wake of a jump belongs to it. A belief that had no place yet, or lost it, does not jump when
+it finds one; one that was told its start, and reckoned on from there, does.
 """
 
 from __future__ import annotations
@@ -24,10 +25,13 @@ WAKE = 2 * SECOND
 FADING = 1.0
 """Seconds in which an unexplained move is forgotten."""
 
-_NO_PLACE = (HealthState.WAITING, HealthState.CONVERGING)
+PLACED = 10.0
+"""Metres of ``radius95`` that are a place."""
+
+_NO_PLACE = (HealthState.WAITING, HealthState.LOST)
 
 TRACKS = frozenset({HealthState.TRACKING})
-UNSEEN = frozenset({HealthState.TRACKING, HealthState.DEAD_RECKONING})
+UNSEEN = frozenset({HealthState.TRACKING, HealthState.DEAD_RECKONING, HealthState.CONVERGING})
 """Healths in which a position may go as far as was claimed: its way measured, or not."""
 
 
@@ -49,6 +53,7 @@ class Jumps:
         self.steps = 0
         self._excused = excused
         self._claimed = 0.0
+        self._placed = False
         self._switches = 0
         self._last = -(2**62)
         self._before: Estimate | None = None
@@ -68,7 +73,7 @@ class Jumps:
     def spoken(self, estimate: Estimate) -> None:
         """See what is published, and count a jump in it for the next estimate to tell."""
         before, self._before = self._before, estimate
-        offset = None if before is None or before.health in _NO_PLACE else _offset(before, estimate)
+        offset = None if before is None or not self._had_place(before) else _offset(before, estimate)
         if before is None or offset is None:
             self._north = self._east = self._claimed = 0.0
             return
@@ -84,6 +89,16 @@ class Jumps:
             if estimate.monotonic_ns - self._last > WAKE:
                 self._step(estimate.monotonic_ns)
             self._north = self._east = 0.0
+
+    def _had_place(self, estimate: Estimate) -> bool:
+        """Say whether what moves from here on may jump; of a belief that converges, whether it had a place before."""
+        if estimate.health in _NO_PLACE:
+            self._placed = False
+        elif estimate.health is not HealthState.CONVERGING and (estimate.radius95 or 0.0) <= PLACED:
+            self._placed = True
+        if estimate.health is HealthState.CONVERGING:
+            return self._placed
+        return estimate.health is not HealthState.WAITING
 
     def _step(self, now: int) -> None:
         self.steps += 1

@@ -133,3 +133,30 @@ def test_nothing_is_said_of_a_place_that_is_not_known() -> None:
     speak(jumps, 0, 0.0)
     jumps.spoken(msgspec.structs.replace(BEFORE, monotonic_ns=TICK, position=(None, None, None)))
     assert speak(jumps, 2, 500.0) == 0
+
+
+@pytest.mark.parametrize(
+    ("first", "radius", "expected"),
+    [
+        (HealthState.DEAD_RECKONING, 2.0, 1),
+        (HealthState.DEAD_RECKONING, 30.0, 0),
+        (HealthState.WAITING, 2.0, 0),
+        (HealthState.LOST, 2.0, 0),
+    ],
+)
+def test_who_converges_jumps_only_from_a_place_that_it_had(
+    first: HealthState, radius: float, expected: int
+) -> None:
+    """7 m in four ticks, the first of them still in the health before: late fixes after a told start, and others."""
+    jumps = Jumps()
+    for k in range(200):
+        jumps.spoken(
+            msgspec.structs.replace(
+                BEFORE,
+                monotonic_ns=k * TICK,
+                position=(0.2 * k + 7.0 * min(1.0, max(0, k - 100) / 4), 0.0, None),
+                radius95=radius,
+                health=first if k <= 100 else HealthState.CONVERGING,
+            )
+        )
+    assert jumps.steps == expected
