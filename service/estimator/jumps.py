@@ -61,8 +61,9 @@ class Jumps:
         self._untracked = -(2**62)
 
     def done(self, now: int) -> None:
-        """Count a jump that was done on purpose at ``now`` (nanoseconds)."""
+        """Count a jump that was done on purpose at ``now`` (nanoseconds): what was before is of another belief."""
         self._step(now)
+        self._before, self._placed = None, False
 
     def led(self, now: int, switches: int) -> None:
         """Hear how often the leading hypothesis has changed so far."""
