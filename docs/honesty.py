@@ -108,8 +108,8 @@ def curves(kept: dict[str, Any], part: str) -> dict[str, np.ndarray]:
 
 
 def plain(name: str) -> str:
-    """Return a name without the marks of the page."""
-    return name.replace("`", "").split(",")[0]
+    """Return a name without the marks of the page, as far as it tells one row from another."""
+    return ",".join(name.replace("`", "").split(",")[:2])
 
 
 def panel(axis: Axes, of: dict[str, np.ndarray], title: str) -> None:
@@ -126,7 +126,7 @@ def panel(axis: Axes, of: dict[str, np.ndarray], title: str) -> None:
     axis.set_xticks([0, 25, 50, 75, 95])
     axis.set_yticks([0, 25, 50, 75, 95])
     if of:
-        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2, fontsize=7.5, frameon=False)
+        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), fontsize=7.5, frameon=False)
 
 
 def draw(kept: dict[str, Any]) -> None:
@@ -143,14 +143,14 @@ def draw(kept: dict[str, Any]) -> None:
         "axes.spines.right": False,
     }
     with mpl.rc_context({**look, "axes.grid": True, "grid.color": "#e6e6e6", "axes.axisbelow": True}):
-        figure = Figure(figsize=(9.6, 5.8), layout="constrained")
+        figure = Figure(figsize=(9.6, 6.2), layout="constrained")
         axes = figure.subplots(1, 3)
         for axis, (title, of) in zip(axes, parts.items(), strict=False):
             panel(axis, of, title)
         panel(axes[2], {f"mean of these {len(everything)}": np.mean(everything, axis=0)}, "all together")
         axes[0].set_ylabel("observed to hold it, %")
         # The legends lie below the axes, where the layout does not look: leave them room.
-        figure.get_layout_engine().set(rect=(0.0, 0.2, 1.0, 0.78))
+        figure.get_layout_engine().set(rect=(0.0, 0.16, 1.0, 0.8))
         text = StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
     PICTURE.write_text(re.sub(r"(\d\.\d\d)\d+", r"\1", text.getvalue()), encoding="utf-8")

@@ -358,7 +358,7 @@ def test_a_tick_that_would_overrun_is_cut(configuration: Configuration) -> None:
 
 def test_memory_is_flat_and_ticks_leave_nothing_behind(rig: Rig) -> None:
     """Four thousand ticks, with everything that is sent in between: what Python holds afterwards is what it held
-    before but for 64 KiB (counters grow into larger integers, and on a busy machine there are more of them; one object
+    before but for 32 KiB (counters grow into larger integers, and on a busy machine there are more of them; one object
     that every tick left behind would be 110 KiB at least), and no tick needs more than 64 KiB on the way.
     """
     rig.estimator.health = HealthState.TRACKING
@@ -375,7 +375,7 @@ def test_memory_is_flat_and_ticks_leave_nothing_behind(rig: Rig) -> None:
         after, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert after - before < 64 * 1024
+    assert after - before < 32 * 1024
     assert peak - before < 64 * 1024
 
 
